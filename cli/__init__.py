@@ -1,0 +1,1 @@
+"""The command: one thin group per package; heavy imports only inside the commands."""

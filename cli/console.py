@@ -1,0 +1,105 @@
+"""What the commands share: groups, JSON for machines, progress for people."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import sys
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import typer
+
+from ..core.progress import Progress
+
+
+def group(name: str, help_text: str, example: str) -> typer.Typer:
+    """Return a command group with plain, fast help."""
+    return typer.Typer(
+        name=name,
+        help=help_text,
+        epilog=f"Example: {example}",
+        no_args_is_help=True,
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+    )
+
+
+def print_json(data: Any) -> None:
+    """Print `data` as JSON; NaN becomes null, since JSON has no NaN."""
+    typer.echo(json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, float) and (
+        value != value or value in (float("inf"), -float("inf"))
+    ):
+        return None
+    return value
+
+
+@contextlib.contextmanager
+def progress(what: str) -> Iterator[Progress]:
+    """Yield a callback that shows a bar with time left, or plain lines where no tty is.
+
+    The bar goes to standard error, so that standard output stays for results.
+    """
+    if sys.stderr.isatty():
+        with _bar(what) as callback:
+            yield callback
+    else:
+        yield _PlainLines(what)
+
+
+@contextlib.contextmanager
+def _bar(what: str) -> Iterator[Progress]:
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+    from rich.progress import (
+        Progress as RichProgress,
+    )
+
+    columns = (
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
+        TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn(),
+    )  # fmt: skip
+    with RichProgress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task(what, total=None)
+
+        def callback(done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total)
+
+        yield callback
+
+
+class _PlainLines:
+    """Print a line at the end and, on long work, one every ten seconds."""
+
+    def __init__(self, what: str) -> None:
+        self._what = what
+        self._start = self._last = time.monotonic()
+
+    def __call__(self, done: int, total: int) -> None:
+        now = time.monotonic()
+        if done < total and now - self._last < 10.0:
+            return
+        self._last = now
+        elapsed = now - self._start
+        left = elapsed * (total - done) / done if done else float("nan")
+        remaining = f", {left:.0f} s left" if done and done < total else ""
+        typer.echo(
+            f"{self._what}: {done}/{total}, {elapsed:.0f} s{remaining}", err=True
+        )

@@ -1,0 +1,68 @@
+"""``magbend``: the groups, and the one place where errors become sentences."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+import typer
+
+from ..core.errors import MagbendError
+from . import analysis, bench, rig, sim, vision
+
+app = typer.Typer(
+    name="magbend",
+    help="Bend magnetic soft continuum rods: drive the bench, measure photographs, "
+    "simulate, and report how far theory is from the bench.",
+    epilog="Example: magbend demo --out demo",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+app.add_typer(rig.app, name="rig")
+app.add_typer(vision.app, name="vision")
+app.add_typer(sim.app, name="sim")
+app.add_typer(analysis.app, name="analysis")
+app.command("demo", epilog=bench.DEMO_EXAMPLE)(bench.demo)
+app.command("doctor", epilog=bench.DOCTOR_EXAMPLE)(bench.doctor)
+
+
+@app.callback()
+def options(
+    debug: bool = typer.Option(False, "--debug", help="Show tracebacks of errors."),
+    version: bool = typer.Option(False, "--version", help="Print the version."),
+) -> None:
+    """Options of every command."""
+    if debug:
+        os.environ["MAGBEND_DEBUG"] = "1"
+    if version:
+        from importlib.metadata import version as version_of
+
+        typer.echo(f"magbend {version_of('magbend')}")
+        raise typer.Exit
+
+
+def main() -> None:
+    """Run the command line; a user's mistake ends in one sentence and exit code 1."""
+    try:
+        app()
+    except MagbendError as error:
+        _stop(error, str(error))
+    except BrokenPipeError:
+        # The reader of our output (head, less) is gone: nothing is left to say.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+    except OSError as error:
+        name = f"{error.filename}: " if error.filename else ""
+        _stop(error, f"{name}{error.strerror or error}")
+
+
+def _stop(error: Exception, sentence: str) -> None:
+    if os.environ.get("MAGBEND_DEBUG"):
+        raise error
+    typer.echo(f"magbend: {' '.join(sentence.split())}", err=True)
+    sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()

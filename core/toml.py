@@ -1,0 +1,163 @@
+"""TOML in, checked by a pydantic model; every mistake is one sentence with its line."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import re
+import tomllib
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from .errors import ConfigError
+
+Location = tuple[int | str, ...]
+Model = TypeVar("Model", bound="FileModel")
+
+
+class FileModel(BaseModel):
+    """Base of all file models: unknown keys, NaN and infinity are refused."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, str_strip_whitespace=True
+    )
+
+
+def read_toml(path: Path, model: type[Model]) -> Model:
+    """Read `path` as TOML (or as JSON, if it starts with a brace) into `model`.
+
+    Raises
+    ------
+    ConfigError
+        If the file is missing, is no TOML, has an unknown key, lacks a key or holds a
+        value that cannot be: one sentence with file, line, key and what is expected.
+    """
+    text = read_text(path)
+    try:
+        data = (
+            json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
+        )
+    except (tomllib.TOMLDecodeError, json.JSONDecodeError) as error:
+        raise ConfigError(f"{path}: is not valid TOML: {error}") from None
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        raise ConfigError(_sentence(path, text, error, model)) from None
+
+
+def read_text(path: Path) -> str:
+    """Return the text of a file the user named.
+
+    Raises
+    ------
+    ConfigError
+        If it is missing, a folder, unreadable, or not UTF-8.
+    """
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise ConfigError(f"{path}: there is no such file") from None
+    except IsADirectoryError:
+        raise ConfigError(f"{path}: is a folder, not a file") from None
+    except UnicodeDecodeError:
+        raise ConfigError(f"{path}: is not a text file (UTF-8)") from None
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def line_of(text: str, location: Location) -> int | None:
+    """Return the line (from 1) of a TOML text where the key at `location` stands.
+
+    Parameters
+    ----------
+    text : str
+        The TOML text.
+    location : tuple of str and int
+        Path of keys and indices, such as ``("section", 1, "E_MPa")``.
+
+    Returns
+    -------
+    int or None
+        The line of the key, else of the table that should hold it, else None.
+    """
+    keys = [part for part in location if isinstance(part, str)]
+    index = next((part for part in location if isinstance(part, int)), 0)
+    table: list[str] = []
+    seen: dict[tuple[str, ...], int] = {}
+    table_line: int | None = None
+    for number, line in enumerate(text.splitlines(), start=1):
+        header = re.match(r"\s*\[(\[)?\s*([\w.\-\"' ]+?)\s*\]", line)
+        if header:
+            table = [part.strip("\"' ") for part in header.group(2).split(".")]
+            if header.group(1):
+                seen[tuple(table)] = seen.get(tuple(table), -1) + 1
+            in_table = seen.get(tuple(table), 0) == index or not header.group(1)
+            if table == keys[: len(table)] and in_table:
+                table_line = number
+            continue
+        key = re.match(r"\s*([\w\-.\"']+)\s*=", line)
+        if not key:
+            continue
+        path = table + [part.strip("\"'") for part in key.group(1).split(".")]
+        in_table = seen.get(tuple(table), index) == index
+        if path == keys[: len(path)] and in_table:
+            return number
+    return table_line
+
+
+def _sentence(
+    path: Path, text: str, error: ValidationError, model: type[BaseModel]
+) -> str:
+    # A mistyped key is both unknown and missing: name the one the user can see.
+    errors = error.errors()
+    first = next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
+    location = first["loc"]
+    line = line_of(text, location)
+    where = f"{path}, line {line}" if line else f"{path}"
+    key = ".".join(str(part) for part in location) or "the file"
+    if first["type"] == "extra_forbidden":
+        return f"{where}: unknown key {key!r}{_suggestion(location, model)}"
+    if first["type"] == "missing":
+        return f"{where}: the key {key!r} is missing"
+    message = first["msg"].removeprefix("Value error, ")
+    message = message[0].lower() + message[1:]
+    return f"{where}: {key}: {message}; instead received {first['input']!r}"
+
+
+def _suggestion(location: Location, model: type[BaseModel]) -> str:
+    known = sorted(_keys_at(location[:-1], model))
+    name = str(location[-1])
+    with_unit = [key for key in known if key.startswith(f"{name}_")]
+    if with_unit:
+        return f"; the unit is missing: write {with_unit[0]!r}"
+    close = difflib.get_close_matches(name, known, n=1)
+    if close:
+        return f"; did you mean {close[0]!r}?"
+    return f"; known keys are {', '.join(known)}" if known else ""
+
+
+def _keys_at(location: Location, model: type[BaseModel]) -> list[str]:
+    """Names and aliases of the keys that the model takes at `location`."""
+    current: Any = model
+    for part in location:
+        if isinstance(part, int):
+            continue
+        fields = getattr(current, "model_fields", {})
+        field = next((f for name, f in fields.items() if part in (name, f.alias)), None)
+        if field is None:
+            return []
+        current = _model_inside(field.annotation)
+    fields = getattr(current, "model_fields", {})
+    return [field.alias or name for name, field in fields.items()]
+
+
+def _model_inside(annotation: Any) -> Any:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    for inner in getattr(annotation, "__args__", ()):
+        found = _model_inside(inner)
+        if found is not None:
+            return found
+    return None

@@ -1,0 +1,119 @@
+"""TOML mistakes become one sentence; files are whole or absent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from magbend.core.errors import ConfigError
+from magbend.core.files import write_bytes
+from magbend.core.specimen_file import (
+    read_magnet,
+    read_specimen,
+    specimen_dict,
+)
+from magbend.core.toml import line_of
+
+GOOD = """\
+name = "GMC 2"
+side_mm = 1.0
+remanence_mT = 20.07
+
+[[section]]
+length_mm = 10.0
+E_MPa = 20.0
+
+[[section]]
+length_mm = 10.0
+E_MPa = 15.0
+"""
+
+
+def specimen_error(tmp_path: Path, text: str) -> str:
+    path = tmp_path / "rod.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        read_specimen(path)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert "rod.toml" in message
+    return message
+
+
+def test_a_specimen_survives_the_round_trip(tmp_path: Path) -> None:
+    path = tmp_path / "rod.toml"
+    path.write_text(GOOD, encoding="utf-8")
+    specimen = read_specimen(path)
+    assert specimen.length_mm == 20.0
+    assert specimen.joints_mm == (10.0,)
+    import json
+
+    path.write_text(json.dumps(specimen_dict(specimen)), encoding="utf-8")
+    assert read_specimen(path) == specimen
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "parts"),
+    [
+        ("side_mm = 1.0", "side = 1.0", ["line 2", "'side'", "unit", "'side_mm'"]),
+        ("side_mm = 1.0", "sidemm = 1.0", ["line 2", "did you mean 'side_mm'"]),
+        ("side_mm = 1.0", "", ["'side_mm' is missing"]),
+        ("E_MPa = 15.0", "E_MPa = -15.0", ["line 11", "E_MPa", "-15.0"]),
+        ("E_MPa = 15.0", "E_MPa = nan", ["line 11", "E_MPa", "finite"]),
+        ("E_MPa = 15.0", 'E_MPa = "soft"', ["line 11", "E_MPa", "'soft'"]),
+        ("E_MPa = 15.0", "E_MPa = ", ["not valid TOML", "line 11"]),
+        ("E_MPa = 15.0", "Emod_MPa = 15.0", ["line 11", "unknown key", "E_MPa"]),
+    ],
+)
+def test_mistakes_are_named_with_their_line(
+    tmp_path: Path, old: str, new: str, parts: list[str]
+) -> None:
+    message = specimen_error(tmp_path, GOOD.replace(old, new))
+    for part in parts:
+        assert part in message
+
+
+def test_a_rod_without_sections_is_refused(tmp_path: Path) -> None:
+    assert "section" in specimen_error(tmp_path, GOOD.split("\n\n")[0])
+    assert "section" in specimen_error(tmp_path, GOOD.split("\n\n")[0] + "\nsection=[]")
+
+
+def test_a_missing_file_and_a_folder_are_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="no such file"):
+        read_specimen(tmp_path / "absent.toml")
+    with pytest.raises(ConfigError, match=r"folder|cannot be read"):
+        read_specimen(tmp_path)
+
+
+def test_a_magnet_takes_one_side_or_three(tmp_path: Path) -> None:
+    path = tmp_path / "magnet.toml"
+    path.write_text("side_mm = 55.0\nremanence_T = 1.305\n", encoding="utf-8")
+    assert read_magnet(path).sides_mm == (55.0, 55.0, 55.0)
+    path.write_text("remanence_T = 1.305\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match="side_mm"):
+        read_magnet(path)
+
+
+def test_lines_are_found_in_nested_tables() -> None:
+    text = "a = 1\n[t]\nb = 2\n[[s]]\nc = 1\n[[s]]\nc = 2\n"
+    assert line_of(text, ("a",)) == 1
+    assert line_of(text, ("t", "b")) == 3
+    assert line_of(text, ("s", 0, "c")) == 5
+    assert line_of(text, ("s", 1, "c")) == 7
+    assert line_of(text, ("s", 1, "missing")) == 6
+
+
+def test_a_failed_write_leaves_the_old_file_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "record.json"
+    write_bytes(path, b"old")
+
+    def full(_descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="No space"):
+        write_bytes(path, b"new")
+    assert path.read_bytes() == b"old"
+    assert [p.name for p in tmp_path.iterdir()] == ["record.json"]
