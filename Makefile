@@ -1,0 +1,47 @@
+# make demo    set up .venv and run the whole loop on the twin bench
+# make test    set up .venv with the test tools and run the test-suite
+# make check   lint, format and type checks, and the import contract
+# make clean   remove .venv and build products
+
+PYTHON ?= python3
+VENV   ?= .venv
+OUT    ?= demo
+BIN    := $(VENV)/bin
+PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+
+.PHONY: demo test check clean
+.DEFAULT_GOAL := demo
+
+demo: $(VENV)/.ready
+	$(BIN)/magbend demo --out $(OUT)
+
+test: $(VENV)/.ready-test
+	$(BIN)/python -m pytest -n 2 --dist loadfile -q
+
+check: $(VENV)/.ready-test
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	rm -rf build/check
+	$(PIP) --no-deps --target build/check .
+	cd build/check && ../../$(BIN)/mypy --config-file ../../pyproject.toml \
+	  -p magbend --namespace-packages --explicit-package-bases
+	cd build/check && ../../$(BIN)/lint-imports --config ../../pyproject.toml
+
+$(VENV)/.created:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "magbend needs Python 3.11 or newer; found $$($(PYTHON) --version). Name another one: make PYTHON=python3.12"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	touch $@
+
+$(VENV)/.ready: $(VENV)/.created pyproject.toml constraints.txt
+	@echo "installing magbend and its pinned dependencies into $(VENV) (once, about a minute)"
+	$(PIP) --constraint constraints.txt --editable .
+	touch $@
+
+$(VENV)/.ready-test: $(VENV)/.created pyproject.toml constraints.txt
+	@echo "installing magbend, all extras and the test tools into $(VENV) (once, a few minutes)"
+	$(PIP) --constraint constraints.txt --editable '.[all,test]'
+	touch $@ $(VENV)/.ready
+
+clean:
+	rm -rf $(VENV) build

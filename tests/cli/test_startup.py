@@ -1,0 +1,103 @@
+"""The command answers at once: help loads nothing heavy."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+HEAVY = (
+    "numpy",
+    "scipy",
+    "cv2",
+    "pandas",
+    "numba",
+    "matplotlib",
+    "serial",
+    "rich",
+    "pydantic",
+    "jinja2",
+    "pyarrow",
+    "dask",
+    "jax",
+    "emcee",
+)
+
+PROBE = """
+import json, sys
+from magbend.cli.main import app
+sys.argv = ["magbend", *{arguments!r}]
+try:
+    app()
+except SystemExit as stop:
+    code = stop.code
+print("\\n" + json.dumps([code, [name for name in {heavy!r} if name in sys.modules]]))
+"""
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["--help"],
+        ["sim", "--help"],
+        ["vision", "--help"],
+        ["rig", "--help"],
+        ["analysis", "--help"],
+        ["analysis", "library", "--help"],
+        ["sim", "shape", "--help"],
+        ["vision", "extract", "--help"],
+        ["rig", "run", "--help"],
+        ["analysis", "report", "--help"],
+        ["demo", "--help"],
+        ["--version"],
+    ],
+    ids=" ".join,
+)
+def test_help_imports_nothing_heavy(arguments: list[str]) -> None:
+    probe = PROBE.format(arguments=arguments, heavy=HEAVY)
+    done = subprocess.run(
+        [sys.executable, "-c", probe], capture_output=True, text=True, check=True
+    )
+    code, loaded = json.loads(done.stdout.splitlines()[-1])
+    assert code in (0, None)
+    assert loaded == []
+
+
+def commands(app: object, path: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
+    """Every command of the tree, as typed."""
+    found = []
+    for command in app.registered_commands:  # type: ignore[attr-defined]
+        name = command.name or command.callback.__name__.replace("_", "-")
+        found.append((*path, name))
+    for group in app.registered_groups:  # type: ignore[attr-defined]
+        name = group.name or group.typer_instance.info.name
+        found += commands(group.typer_instance, (*path, name))
+    return found
+
+
+def test_every_command_has_help_with_an_example() -> None:
+    from typer.testing import CliRunner
+
+    from magbend.cli.main import app
+
+    runner = CliRunner()
+    tree = commands(app)
+    assert len(tree) > 15
+    for command in tree:
+        shown = runner.invoke(app, [*command, "--help"])
+        assert shown.exit_code == 0, command
+        assert "Example" in shown.output, f"magbend {' '.join(command)}"
+
+
+def test_wrong_usage_ends_with_2_and_no_traceback() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "magbend.cli.main", "sim", "shape", "--no-such-option"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert "--no-such-option" in done.stderr

@@ -1,0 +1,74 @@
+"""The house keeps its own rules."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGES = ("core", "sim", "vision", "rig", "analysis", "cli")
+
+
+def tracked() -> list[Path]:
+    done = subprocess.run(
+        ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        pytest.skip("not a git checkout")
+    return [ROOT / name for name in done.stdout.splitlines()]
+
+
+def test_every_package_folder_is_installed() -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    listed = set(settings["tool"]["setuptools"]["packages"])
+    on_disk = {
+        "magbend." + ".".join(init.parent.relative_to(ROOT).parts)
+        for package in PACKAGES
+        for init in (ROOT / package).rglob("__init__.py")
+    }
+    assert listed == on_disk
+
+
+def test_no_file_names_a_package_index_or_a_path_of_a_machine() -> None:
+    # Each pattern is written so that this file does not match itself.
+    patterns = (
+        r"pypi\.or[g]",
+        r"files\.pythonhoste[d]",
+        r"(?<![\w.])/(work|root|home)/\w",
+    )
+    for path in tracked():
+        if path.suffix in {".png", ".jpg", ".pdf", ".npz", ".parquet"}:
+            continue
+        if not path.is_file():
+            continue
+        text = path.read_text(encoding="utf-8", errors="replace")
+        for pattern in patterns:
+            assert not re.search(pattern, text), f"{path.relative_to(ROOT)}: {pattern}"
+
+
+def test_the_tree_stays_small() -> None:
+    sizes = {path: path.stat().st_size for path in tracked() if path.is_file()}
+    fixtures = sum(size for path, size in sizes.items() if "fixtures" in path.parts)
+    assert fixtures < 20e6
+    large = [str(path) for path, size in sizes.items() if size > 3e6]
+    assert not large
+
+
+def test_the_constraints_pin_every_dependency() -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    project = settings["project"]
+    wanted = list(project["dependencies"])
+    for extra in project["optional-dependencies"].values():
+        wanted += [item for item in extra if not item.startswith("magbend")]
+    names = {
+        re.split(r"[<>=\[ ]", item)[0].lower().replace("_", "-") for item in wanted
+    }
+    lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    pinned = {
+        line.split("==")[0].lower().replace("_", "-") for line in lines if "==" in line
+    }
+    assert names <= pinned
