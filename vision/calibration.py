@@ -141,7 +141,7 @@ class Calibration:
             return np.asarray(camera[:2] + reach[:, None] * rays[:, :2])
 
     def to_px(self, points_mm: Array, *, height_mm: float = 0.0) -> Array:
-        """Return the pixels of points at `height_mm` above the board (inverse of to_mm).
+        """Return the pixels of points `height_mm` above the board: undo `to_mm`.
 
         Parameters
         ----------
