@@ -1,0 +1,97 @@
+"""Time as something handed in: the wall clock, a fast one, and one that only steps."""
+
+from __future__ import annotations
+
+import time
+from datetime import UTC, datetime, timedelta
+from typing import Protocol
+
+from ..core.checks import positive
+
+
+class Clock(Protocol):
+    """What the rig asks of time; every wait of the rig goes through `sleep`."""
+
+    def monotonic_s(self) -> float:
+        """Return seconds since an arbitrary start; never falls."""
+        ...
+
+    def utc(self) -> datetime:
+        """Return the time-zone aware UTC time."""
+        ...
+
+    def sleep(self, duration_s: float) -> None:
+        """Let `duration_s` seconds of this clock pass."""
+        ...
+
+
+class SystemClock:
+    """The clock of the machine: use it with real devices."""
+
+    def monotonic_s(self) -> float:
+        """Return the system's monotonic time in s."""
+        return time.monotonic()
+
+    def utc(self) -> datetime:
+        """Return the system's UTC time."""
+        return datetime.now(UTC)
+
+    def sleep(self, duration_s: float) -> None:
+        """Sleep."""
+        time.sleep(max(duration_s, 0.0))
+
+
+class ScaledClock:
+    """A clock that runs `speed` times as fast as the system's: a demonstration.
+
+    Parameters
+    ----------
+    speed : float
+        Seconds of this clock in one second of the system's.
+    """
+
+    def __init__(self, speed: float) -> None:
+        self._speed = positive(speed, "speed of the clock")
+        self._start_s = time.monotonic()
+        self._start_utc = datetime.now(UTC)
+
+    def monotonic_s(self) -> float:
+        """Return the scaled seconds since this clock was made."""
+        return (time.monotonic() - self._start_s) * self._speed
+
+    def utc(self) -> datetime:
+        """Return the scaled UTC time."""
+        return self._start_utc + timedelta(seconds=self.monotonic_s())
+
+    def sleep(self, duration_s: float) -> None:
+        """Sleep `duration_s` scaled seconds."""
+        time.sleep(max(duration_s, 0.0) / self._speed)
+
+
+class SteppedClock:
+    """A clock that moves only in `sleep`: the twin bench as fast as the processor.
+
+    Twin devices that share it with the driver make runs that take minutes on the bench
+    take a second, the same every time. Use it from one thread.
+
+    Parameters
+    ----------
+    start_utc : datetime, optional
+        The UTC time it begins at; by default the system's.
+    """
+
+    def __init__(self, start_utc: datetime | None = None) -> None:
+        self._now_s = 0.0
+        self._start_utc = start_utc or datetime.now(UTC)
+
+    def monotonic_s(self) -> float:
+        """Return the seconds slept so far."""
+        return self._now_s
+
+    def utc(self) -> datetime:
+        """Return the start time plus the seconds slept so far."""
+        return self._start_utc + timedelta(seconds=self._now_s)
+
+    def sleep(self, duration_s: float) -> None:
+        """Move on by `duration_s` at once."""
+        self._now_s += max(duration_s, 0.0)

@@ -1,0 +1,341 @@
+"""The stage as people use it: gaps in mm from the magnet's N face.
+
+The map is ``gap_mm = gap_at_zero_mm + direction * machine_mm``. Every gap is checked
+here, before a byte is sent; every position is approached from the far side, so that
+backlash is always taken up in the same sense.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from ..core.checks import finite
+from ..core.progress import Progress, silent
+from .clock import Clock
+from .stage import (
+    InterlockError,
+    PositionLostError,
+    PositionState,
+    Stage,
+    StageIdentity,
+    StageLimits,
+    StageState,
+)
+from .stage_config import LimitsModel, StageModel
+
+logger = logging.getLogger(__name__)
+
+Approach = Literal["far side", "clipped"]
+AbortPolicy = Literal["hold", "retract"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MoveRecord:
+    """How the stage came to a gap.
+
+    Attributes
+    ----------
+    gap_mm, stage_mm : float
+        Where the controller says it stands: gap and machine position, in mm.
+    duration_s : float
+        Time of the whole move.
+    approach : {"far side", "clipped"}
+        ``far side``: the last motion was toward the magnet, over the full backlash;
+        ``clipped``: a limit left too little room to come from farther away.
+    """
+
+    gap_mm: float
+    stage_mm: float
+    duration_s: float
+    approach: Approach
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GapStatus:
+    """State of the stage in one line; `gap_mm` is None when the position is unknown."""
+
+    state: StageState
+    position_state: PositionState
+    gap_mm: float | None
+    stage_mm: float | None
+    feed_mm_min: float
+    alarm: int | None
+    pins: str
+
+
+class GapStage:
+    """A stage with the gap frame, the interlock and the one-sided approach.
+
+    Parameters
+    ----------
+    stage : Stage
+        The raw stage, in machine mm; not yet connected.
+    config : StageModel
+        Table ``[stage]`` of the rig file.
+    bounds : LimitsModel
+        Table ``[limits]`` of the rig file.
+    clock : Clock
+        Time.
+    """
+
+    def __init__(
+        self, stage: Stage, config: StageModel, bounds: LimitsModel, clock: Clock
+    ) -> None:
+        self._stage = stage
+        self._config = config
+        self._bounds = bounds
+        self._clock = clock
+        self._from_far_side = False
+
+    @property
+    def identity(self) -> StageIdentity:
+        """Who answers on the port, with all its settings."""
+        return self._stage.identity
+
+    @property
+    def limits(self) -> StageLimits:
+        """What the controller is set to."""
+        return self._stage.limits
+
+    @property
+    def position_state(self) -> PositionState:
+        """How far the position can be trusted."""
+        return self._stage.position_state
+
+    def to_machine_mm(self, gap_mm: float) -> float:
+        """Return the machine position of a gap, both in mm."""
+        return (gap_mm - self._config.gap_at_zero_mm) / self._config.direction
+
+    def to_gap_mm(self, machine_mm: float) -> float:
+        """Return the gap of a machine position, both in mm."""
+        return self._config.gap_at_zero_mm + self._config.direction * machine_mm
+
+    def connect(self) -> None:
+        """Open the port, identify and audit the controller.
+
+        Raises
+        ------
+        StageError
+            If nobody answers, a setting does not fit the rig file (named in the
+            sentence), or the stage could not stop before it touches.
+        """
+        self._stage.connect()
+        self._require_room_to_stop(self._config.feed_mm_min)
+        self._from_far_side = False
+
+    def home(self) -> None:
+        """Find the reference; afterwards the position is ``homed``."""
+        self._from_far_side = False
+        self._stage.home()
+
+    def assume_gap(self, gap_mm: float) -> None:
+        """Take the operator's word that the stage stands at `gap_mm`.
+
+        For controllers without switches (``homing = "manual"``). The controller's own
+        count is kept; what changes is that it is believed.
+        """
+        finite(gap_mm, "gap_mm", "mm")
+        self._stage.assume_homed(self.to_machine_mm(gap_mm))
+        self._from_far_side = False
+
+    def range_mm(self) -> tuple[float, float]:
+        """Return the smallest and largest gap that may be asked for, in mm."""
+        low, high = self._bounds.min_gap_mm, self._bounds.max_gap_mm
+        travel = self._stage.limits.travel_mm
+        if travel is not None:
+            ends = sorted(self.to_gap_mm(end) for end in travel)
+            low, high = max(low, ends[0]), min(high, ends[1])
+        return low, high
+
+    def check_gap(self, gap_mm: float) -> None:
+        """Refuse a gap that may not be visited; nothing is sent.
+
+        Raises
+        ------
+        InterlockError
+            If it is nearer than `min_gap_mm`, beyond `max_gap_mm`, or outside the
+            travel of the controller.
+        """
+        finite(gap_mm, "gap_mm", "mm")
+        bounds = self._bounds
+        if gap_mm < bounds.min_gap_mm:
+            raise InterlockError(
+                f"gap_mm must be at least {bounds.min_gap_mm:g} mm (limits.min_gap_mm "
+                f"of the rig file); instead received {gap_mm:g} mm; nothing was sent"
+            )
+        if gap_mm > bounds.max_gap_mm:
+            raise InterlockError(
+                f"gap_mm must be at most {bounds.max_gap_mm:g} mm (limits.max_gap_mm "
+                f"of the rig file); instead received {gap_mm:g} mm; nothing was sent"
+            )
+        low, high = self.range_mm()
+        slack_mm = self._stage.limits.step_mm / 2.0
+        if not low - slack_mm <= gap_mm <= high + slack_mm:
+            raise InterlockError(
+                f"gap_mm must be from {low:g} to {high:g} mm, which is the travel of "
+                f"the controller; instead received {gap_mm:g} mm; nothing was sent"
+            )
+
+    def goto_gap(
+        self,
+        gap_mm: float,
+        *,
+        feed_mm_min: float | None = None,
+        progress: Progress = silent,
+    ) -> MoveRecord:
+        """Go to a gap, from the far side, and return when the stage stands there.
+
+        Parameters
+        ----------
+        gap_mm : float
+            Where to, in mm from the N face.
+        feed_mm_min : float, optional
+            Speed in mm/min; by default that of the rig file.
+        progress : callable
+            Called with legs done and legs in all.
+
+        Raises
+        ------
+        InterlockError
+            If the gap, or the speed, is refused; nothing was sent.
+        PositionLostError
+            If the stage must be homed first.
+        StageError
+            If the move did not end where it should; the stage stands.
+        """
+        self.check_gap(gap_mm)
+        feed = self._config.feed_mm_min if feed_mm_min is None else feed_mm_min
+        self._require_room_to_stop(feed)
+        self._require_homed()
+        here = self.status().gap_mm
+        if here is None:
+            raise PositionLostError("the stage does not report a position; home it")
+        legs, approach = self._legs(here, gap_mm)
+        start_s = self._clock.monotonic_s()
+        self._from_far_side = False
+        for index, leg_mm in enumerate(legs):
+            progress(index, len(legs))
+            self._stage.move_to(self.to_machine_mm(leg_mm), feed_mm_min=feed)
+        progress(len(legs), len(legs))
+        self._from_far_side = approach == "far side"
+        there = self.status()
+        if there.gap_mm is None or there.stage_mm is None:
+            raise PositionLostError("the stage does not report a position; home it")
+        return MoveRecord(
+            gap_mm=there.gap_mm,
+            stage_mm=there.stage_mm,
+            duration_s=self._clock.monotonic_s() - start_s,
+            approach=approach,
+        )
+
+    def status(self) -> GapStatus:
+        """Ask the controller where it is."""
+        status = self._stage.status()
+        known = status.machine_mm is not None and status.position_state != "unknown"
+        machine = status.machine_mm
+        return GapStatus(
+            state=status.state,
+            position_state=status.position_state,
+            gap_mm=self.to_gap_mm(machine) if known and machine is not None else None,
+            stage_mm=machine,
+            feed_mm_min=status.feed_mm_min,
+            alarm=status.alarm,
+            pins=status.pins,
+        )
+
+    def hold(self) -> None:
+        """Slow down, stand, forget the rest of the move; the position stays good."""
+        self._from_far_side = False
+        self._stage.hold()
+
+    def stop(self) -> None:
+        """Stop at once; what moved is ``unverified`` afterwards."""
+        self._from_far_side = False
+        self._stage.stop()
+
+    def abort(self, policy: AbortPolicy | None = None) -> None:
+        """Hold; with the policy ``retract`` also go away from the magnet.
+
+        Parameters
+        ----------
+        policy : {"hold", "retract"}, optional
+            By default `on_abort` of the rig file. The stage retracts only while its
+            position is ``homed``; else it holds.
+        """
+        self.hold()
+        chosen = self._bounds.on_abort if policy is None else policy
+        if chosen != "retract" or self.position_state != "homed":
+            return
+        far = self._bounds.retract_gap_mm
+        target = self.range_mm()[1] if far is None else far
+        here = self.status().gap_mm
+        if here is not None and here < target:
+            self._stage.move_to(
+                self.to_machine_mm(target), feed_mm_min=self._config.feed_mm_min
+            )
+
+    def recover(self) -> None:
+        """Bring the controller back after an alarm, a timeout or a lost link."""
+        self._from_far_side = False
+        self._stage.recover()
+
+    def unlock(self, *, confirm: bool) -> None:
+        """Lift an alarm without homing; only with the operator's word.
+
+        Raises
+        ------
+        InterlockError
+            If `confirm` is False.
+        """
+        if not confirm:
+            raise InterlockError(
+                "unlocking lets a stage move that does not know where it is; "
+                "confirm it, or home the stage instead"
+            )
+        self._from_far_side = False
+        self._stage.unlock()
+
+    def close(self) -> None:
+        """Let go of the port."""
+        self._stage.close()
+
+    def _legs(self, here_mm: float, gap_mm: float) -> tuple[list[float], Approach]:
+        """Gaps to visit in turn, so that the last motion is toward the magnet."""
+        step_mm = self._stage.limits.step_mm
+        backlash_mm = self._config.backlash_mm
+        if math.isclose(here_mm, gap_mm, abs_tol=step_mm) and self._from_far_side:
+            return [], "far side"
+        if here_mm >= gap_mm + backlash_mm - step_mm and here_mm > gap_mm:
+            return [gap_mm], "far side"
+        beyond_mm = min(gap_mm + backlash_mm, max(self.range_mm()[1], gap_mm))
+        clipped = beyond_mm < gap_mm + backlash_mm - step_mm
+        legs = [gap_mm] if beyond_mm <= gap_mm else [beyond_mm, gap_mm]
+        return legs, "clipped" if clipped else "far side"
+
+    def _require_homed(self) -> None:
+        state = self.position_state
+        if state != "homed":
+            raise PositionLostError(
+                f"the position of the stage is {state}; home it first "
+                "(magbend rig home), then move"
+            )
+
+    def _require_room_to_stop(self, feed_mm_min: float) -> None:
+        limits, bounds = self._stage.limits, self._bounds
+        finite(feed_mm_min, "feed_mm_min", "mm/min")
+        if not 0.0 < feed_mm_min <= limits.max_feed_mm_min:
+            raise InterlockError(
+                f"feed_mm_min must be above zero and at most the controller's "
+                f"{limits.max_feed_mm_min:g} mm/min; instead received {feed_mm_min:g}"
+            )
+        room_mm = bounds.min_gap_mm - bounds.contact_gap_mm
+        needed_mm = limits.stopping_mm(feed_mm_min)
+        if needed_mm > room_mm:
+            raise InterlockError(
+                f"at {feed_mm_min:g} mm/min the stage needs {needed_mm:.2f} mm to "
+                f"stop, but min_gap_mm is only {room_mm:g} mm before contact_gap_mm; "
+                "lower feed_mm_min or raise min_gap_mm"
+            )
