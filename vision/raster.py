@@ -8,6 +8,7 @@ supersampling it is exact, and its cost grows with the outline, not with the are
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numba import njit
@@ -32,16 +33,60 @@ def coverage(polygon_px: Array, width: int, height: int) -> NDArray[np.float32]:
     ndarray of float32, shape (height, width)
         Area of each pixel inside the polygon.
     """
-    cells = np.zeros((height, width + 2))
-    outline = np.ascontiguousarray(polygon_px, dtype=np.float64) + 0.5
-    if len(outline) >= 3 and np.all(np.isfinite(outline)):
-        _accumulate(outline, cells, width, height)
-    area = np.abs(np.cumsum(cells[:, :width], axis=1))
-    return np.minimum(area, 1.0).astype(np.float32)
+    return coverage_of([polygon_px], [1], width, height)
+
+
+def coverage_of(
+    polygons_px: Sequence[Array], signs: Sequence[int], width: int, height: int
+) -> NDArray[np.float32]:
+    """Return how much of each pixel several polygons cover, from 0 to 1.
+
+    Parameters
+    ----------
+    polygons_px : sequence of ndarray, shape (n, 2)
+        Simple polygons, as for `coverage`.
+    signs : sequence of int
+        +1 adds the polygon, -1 cuts it out. Added polygons may touch but not overlap,
+        and a hole must lie inside of what it is cut from.
+    width, height : int
+        Size of the picture.
+
+    Returns
+    -------
+    ndarray of float32, shape (height, width)
+        Area of each pixel inside.
+    """
+    picture = np.zeros((height, width), dtype=np.float32)
+    outlines = [np.ascontiguousarray(p, dtype=np.float64) + 0.5 for p in polygons_px]
+    kept = [
+        (outline, sign)
+        for outline, sign in zip(outlines, signs, strict=True)
+        if len(outline) >= 3 and np.all(np.isfinite(outline))
+    ]
+    if not kept:
+        return picture
+    everything = np.concatenate([outline for outline, _ in kept])
+    left, top = np.clip(np.floor(everything.min(axis=0)), 0, (width, height))
+    right, bottom = np.clip(np.ceil(everything.max(axis=0)), 0, (width, height))
+    x0, y0, columns, rows = int(left), int(top), int(right - left), int(bottom - top)
+    if columns <= 0 or rows <= 0:
+        return picture
+    cells = np.zeros((rows, columns + 2))
+    for outline, sign in kept:
+        turn = 1.0 if _signed_area(outline) > 0.0 else -1.0
+        _accumulate(outline - (x0, y0), cells, columns, rows, -sign * turn)
+    area = np.cumsum(cells[:, :columns], axis=1)
+    picture[y0 : y0 + rows, x0 : x0 + columns] = np.clip(area, 0.0, 1.0)
+    return picture
+
+
+def _signed_area(outline: Array) -> float:
+    x, y = outline.T
+    return float(0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)))
 
 
 @njit(cache=True)
-def _accumulate(outline, cells, width, height):  # type: ignore[no-untyped-def]
+def _accumulate(outline, cells, width, height, weight):  # type: ignore[no-untyped-def]
     """Add the signed area right of every edge to `cells`; corners at integers."""
     n = outline.shape[0]
     for i in range(n):
@@ -49,9 +94,9 @@ def _accumulate(outline, cells, width, height):  # type: ignore[no-untyped-def]
         x1, y1 = outline[(i + 1) % n, 0], outline[(i + 1) % n, 1]
         if y0 == y1:
             continue
-        sign = 1.0
+        sign = weight
         if y0 > y1:
-            sign = -1.0
+            sign = -weight
             x0, y0, x1, y1 = x1, y1, x0, y0
         slope = (x1 - x0) / (y1 - y0)
         if y0 < 0.0:
