@@ -1,23 +1,23 @@
 """Flux density and its gradient outside a cuboid magnet, in closed form.
 
-A cuboid of half sides (a, b, c), polarised along its own z, has the field of two charged
-faces z = +-c. With u = x -+ a, v = y -+ b, w = z -+ c, r = |(u, v, w)|, K = B_r / 4 pi and
-the sign s of each corner (Furlani, Permanent Magnet and Electromechanical Devices, 2001,
-sec. 4.3):
+A cuboid of half sides (a, b, c), polarised along its own z, has the field of two
+charged faces z = +-c. With u = x -+ a, v = y -+ b, w = z -+ c, r = |(u, v, w)|,
+K = B_r / 4 pi and the sign s of each corner (Furlani, Permanent Magnet and
+Electromechanical Devices, 2001, sec. 4.3):
 
     Bx = K sum s ln(r + v),  By = K sum s ln(r + u),  Bz = -K sum s atan(u v / (w r))
 
-and, since B has neither curl nor divergence outside, the gradient needs no derivative of
-the arc tangent. Three measures keep all digits:
+and, since B has neither curl nor divergence outside, the gradient needs no derivative
+of the arc tangent. Three measures keep all digits:
 
 * The point is mirrored into x, y, z >= 0. There ln(r + v) cancels only for corners with
   v < 0, where r + v = (u^2 + w^2) / (r - v); what remains singular are the edges.
 * The logarithms are taken once, of the product of their arguments.
-* From `FAR` largest sides on, where eight corners nearly cancel (the loss grows with the
-  third power of the distance), the volume is summed as 8^3 Gauss points of dipoles.
+* From `FAR` largest sides on, where eight corners nearly cancel (the loss grows with
+  the third power of the distance), the volume is summed as 8^3 Gauss points of dipoles.
 
-Lengths may have any one unit; fields are in T and gradients in T per that unit. A magnet is
-a block of 16 numbers (`magnet_block`) so that kernels take one array.
+Lengths may have any one unit; fields are in T and gradients in T per that unit. A
+magnet is a block of 16 numbers (`magnet_block`) so that kernels take one array.
 """
 
 from __future__ import annotations
@@ -183,6 +183,86 @@ def cuboid_flux(block, x, y, z, out):  # type: ignore[no-untyped-def]
             out[3 + 3 * i + j] = (
                 hx * block[6 + j] + hy * block[9 + j] + hz * block[12 + j]
             )
+
+
+@njit(cache=True)
+def plane_flux(block, x, y):  # type: ignore[no-untyped-def]
+    """Return (Bx, By, dBx/dx, dBx/dy, dBy/dy) in the plane z = 0 of the specimen.
+
+    For magnets symmetric about that plane (no elevation, no offset along z), whose own
+    x and z axes lie in it: half the work of `cuboid_flux`. The gradient is symmetric.
+    """
+    a = block[0]
+    b = block[1]
+    c = block[2]
+    dx = x - block[3]
+    dy = y - block[4]
+    px = block[6] * dx + block[7] * dy
+    pz = block[12] * dx + block[13] * dy
+    sx = -1.0 if px < 0.0 else 1.0
+    sz = -1.0 if pz < 0.0 else 1.0
+    px = abs(px)
+    pz = abs(pz)
+    far = 2.0 * FAR * max(a, b, c)
+    if px * px + pz * pz > far * far:
+        f = _far_field(a, b, c, block[15], px, 0.0, pz)
+        bx, bz, gxx, gxz, gzz = f[0], f[2], f[3], f[5], -(f[3] + f[6])
+    else:
+        bx, bz, gxx, gxz, gzz = _near_plane(a, b, c, block[15], px, pz)
+    bx *= sx * sz
+    gxx *= sz
+    gxz *= sx
+    gzz *= sz
+    rx = block[6]
+    ry = block[7]
+    tx = block[12]
+    ty = block[13]
+    hx = rx * gxx + tx * gxz
+    hz = rx * gxz + tx * gzz
+    return (
+        rx * bx + tx * bz,
+        ry * bx + ty * bz,
+        hx * rx + hz * tx,
+        hx * ry + hz * ty,
+        ry * (ry * gxx + ty * gxz) + ty * (ry * gxz + ty * gzz),
+    )
+
+
+@njit(cache=True)
+def _near_plane(a, b, c, J, x, z):  # type: ignore[no-untyped-def]
+    """Field and gradient in the magnet's own plane y = 0, for x, z >= 0."""
+    num = den = 1.0
+    bz = gxx = gxz = gyy = 0.0
+    for i in range(2):
+        u = x - a if i == 0 else x + a
+        for k in range(2):
+            w = z - c if k == 0 else z + c
+            s = 1.0 if i == k else -1.0
+            d = u * u + w * w
+            r = math.sqrt(d + b * b)
+            if i == k:
+                num *= (r + b) * (r + b)
+                den *= d
+            else:
+                den *= (r + b) * (r + b)
+                num *= d
+            if w != 0.0:
+                bz -= s * math.atan(u * b / (w * r))
+            g = s * b / (r * d)
+            gxx -= u * g
+            gxz -= w * g
+            ru = r + u if u >= 0.0 else (b * b + w * w) / (r - u)
+            gyy += s * b / (r * ru)
+    f = J / (4.0 * math.pi)
+    gxx *= 2.0
+    gyy *= 2.0
+    return (
+        f * math.log(num / den),
+        2.0 * f * bz,
+        f * gxx,
+        f * 2.0 * gxz,
+        -f * (gxx + gyy),
+    )
 
 
 @njit(cache=True)
