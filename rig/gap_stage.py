@@ -24,7 +24,7 @@ from .stage import (
     StageLimits,
     StageState,
 )
-from .stage_config import LimitsModel, StageModel
+from .stage_config import LimitsConfig, StageConfig
 
 logger = logging.getLogger(__name__)
 
@@ -73,16 +73,16 @@ class GapStage:
     ----------
     stage : Stage
         The raw stage, in machine mm; not yet connected.
-    config : StageModel
+    config : StageConfig
         Table ``[stage]`` of the rig file.
-    bounds : LimitsModel
+    bounds : LimitsConfig
         Table ``[limits]`` of the rig file.
     clock : Clock
         Time.
     """
 
     def __init__(
-        self, stage: Stage, config: StageModel, bounds: LimitsModel, clock: Clock
+        self, stage: Stage, config: StageConfig, bounds: LimitsConfig, clock: Clock
     ) -> None:
         self._stage = stage
         self._config = config
@@ -246,6 +246,10 @@ class GapStage:
             pins=status.pins,
         )
 
+    def stop_requested(self) -> bool:
+        """Return whether ``magbend rig stop`` asks this process to stop."""
+        return self._stage.stop_requested()
+
     def hold(self) -> None:
         """Slow down, stand, forget the rest of the move; the position stays good."""
         self._from_far_side = False
@@ -256,18 +260,17 @@ class GapStage:
         self._from_far_side = False
         self._stage.stop()
 
-    def abort(self, policy: AbortPolicy | None = None) -> None:
+    def abort(self, policy: AbortPolicy = "hold") -> None:
         """Hold; with the policy ``retract`` also go away from the magnet.
 
         Parameters
         ----------
-        policy : {"hold", "retract"}, optional
-            By default `on_abort` of the rig file. The stage retracts only while its
-            position is ``homed``; else it holds.
+        policy : {"hold", "retract"}
+            The stage retracts (to `retract_gap_mm`, or as far as it may) only while
+            its position is ``homed``; else it holds.
         """
         self.hold()
-        chosen = self._bounds.on_abort if policy is None else policy
-        if chosen != "retract" or self.position_state != "homed":
+        if policy != "retract" or self.position_state != "homed":
             return
         far = self._bounds.retract_gap_mm
         target = self.range_mm()[1] if far is None else far

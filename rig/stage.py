@@ -186,6 +186,10 @@ class Stage(Protocol):
         """Ask the controller; a silent controller is a status, not an error."""
         ...
 
+    def stop_requested(self) -> bool:
+        """Return whether another process asks this one to stop the stage."""
+        ...
+
     def hold(self) -> None:
         """Slow down, stand, forget the rest of the move; the position stays good."""
         ...

@@ -12,7 +12,7 @@ PositiveNumber = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
 
-class StageModel(FileModel):
+class StageConfig(FileModel):
     """How the stage is reached, what its controller must be set to, and its map.
 
     The map is ``gap_mm = gap_at_zero_mm + direction * machine_mm``.
@@ -42,13 +42,13 @@ class StageModel(FileModel):
     settings: dict[str, float] = Field(default_factory=dict)
 
     @model_validator(mode="after")
-    def _home_command_is_a_homing(self) -> StageModel:
+    def _home_command_is_a_homing(self) -> StageConfig:
         if self.driver == "grbl" and not self.home_command.startswith("$H"):
             raise ValueError("home_command must be '$H', '$HX', '$HY' or '$HZ'")
         return self
 
 
-class LimitsModel(FileModel):
+class LimitsConfig(FileModel):
     """Where the stage may go, as gaps in mm from the magnet's N face.
 
     `min_gap_mm` is the interlock. `contact_gap_mm` is the gap at which something
@@ -59,11 +59,10 @@ class LimitsModel(FileModel):
     min_gap_mm: NotNegative
     max_gap_mm: PositiveNumber
     contact_gap_mm: float = 0.0
-    on_abort: Literal["hold", "retract"] = "hold"
     retract_gap_mm: PositiveNumber | None = None
 
     @model_validator(mode="after")
-    def _ordered(self) -> LimitsModel:
+    def _ordered(self) -> LimitsConfig:
         if self.max_gap_mm <= self.min_gap_mm:
             raise ValueError("max_gap_mm must be above min_gap_mm")
         if self.contact_gap_mm > self.min_gap_mm:
