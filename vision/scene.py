@@ -21,7 +21,7 @@ from .board import Board
 from .calibration import Calibration
 from .measurement import Pose
 from .raster import coverage, coverage_of, strip
-from .synthetic import encode_srgb
+from .srgb import encode_srgb
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.float32]

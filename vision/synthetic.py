@@ -24,6 +24,7 @@ from ..core.errors import InputError
 from .calibration import Calibration, scale_calibration
 from .measurement import Pose
 from .raster import coverage, strip
+from .srgb import encode_srgb
 
 Array = NDArray[np.float64]
 Kind = Literal["straight", "arc", "s", "graded"]
@@ -312,21 +313,6 @@ def _expose(
         linear = np.asarray(cv2.GaussianBlur(linear, (0, 0), light.blur_px))
     noise = rng.standard_normal(linear.shape, dtype=np.float32)
     return np.asarray(linear + np.float32(light.noise) * noise)
-
-
-def encode_srgb(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Return linear light from 0 to 1 as 8-bit sRGB (IEC 61966-2-1)."""
-    index = np.clip(linear, 0.0, 1.0) * np.float32(len(_SRGB) - 1) + np.float32(0.5)
-    return np.asarray(_SRGB[index.astype(np.int32)])
-
-
-def _srgb_table() -> NDArray[np.uint8]:
-    x = np.linspace(0.0, 1.0, 65536)
-    curve_ = np.where(x <= 0.0031308, 12.92 * x, 1.055 * x ** (1 / 2.4) - 0.055)
-    return np.asarray(np.round(255.0 * curve_), dtype=np.uint8)
-
-
-_SRGB = _srgb_table()
 
 
 SHAPES: tuple[tuple[str, Kind, float], ...] = (
