@@ -1,0 +1,51 @@
+"""What a run writes down, as plain data: step records, files, hashes, times.
+
+The folder is described in DESIGN, section 4; `run_folder` writes it, `read_run` reads
+it and `verify` checks it. Nothing here touches a device.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+RUN_FILE = "run.json"
+PLAN_FILE = "plan.toml"
+STEPS_FILE = "steps.jsonl"
+END_FILE = "end.json"
+SESSIONS_FILE = "sessions.jsonl"
+WIRE_FILE = "wire.log"
+IMAGES = "images"
+SCHEMA = 1
+
+Record = dict[str, Any]
+"""One JSON object: a step, a session, the manifest."""
+
+
+def utc_now() -> str:
+    """Return the time of day in UTC, ISO 8601 with milliseconds."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
+def sha256_of(data: bytes) -> str:
+    """Return the SHA-256 of `data` as 64 hexadecimal digits."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def sha256_of_file(path: Path) -> str:
+    """Return the SHA-256 of a file, read in pieces.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    """
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def image_name(index: int) -> str:
+    """Return the path of a step's photograph inside the run folder."""
+    return f"{IMAGES}/step_{index:03d}.png"

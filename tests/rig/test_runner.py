@@ -1,0 +1,201 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import pytest
+
+from magbend.core.errors import CameraError, StoreError
+from magbend.rig.read_run import read_run
+from magbend.rig.runner import run
+from magbend.rig.stage import InterlockError, LinkLostError
+from magbend.rig.verify import verify_run
+
+
+def test_a_run_records_every_step_and_verifies(bench, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    summary = run(bench.plan, bench.devices, out)
+    assert (summary.status, summary.steps_done) == ("success", 3)
+    assert verify_run(out) == []
+    record = read_run(out)
+    assert [step["gap_mm"] for step in record.steps] == [70.0, 60.0, 50.0]
+    assert all(step["settle"]["status"] == "settled" for step in record.steps)
+    assert record.steps[0]["flux_mT"] == pytest.approx(38.0, abs=0.2)
+    assert record.manifest["specimen"]["name"] == "GMC 2"
+    assert record.manifest["rig"]["magnet"]["side_mm"] == 55.0
+    assert record.manifest["devices"]["stage"]["settings"] == {"$100": "250.000"}
+    image = cv2.imread(str(out / "images/step_002.png"), cv2.IMREAD_UNCHANGED)
+    assert image.shape == (96, 128)
+
+
+def test_every_gap_is_reached_from_the_far_side(bench, tmp_path: Path) -> None:
+    run(bench.plan, bench.devices, tmp_path / "out")
+    moves = [float(c.split()[1]) for c in bench.raw.calls if c.startswith("move")]
+    assert moves == sorted(moves, reverse=True)
+
+
+def test_the_manifest_is_written_before_anything_moves(bench, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    seen: list[bool] = []
+
+    def before(call: str) -> None:
+        if call == "home":
+            seen.append(json.loads((out / "run.json").read_text())["schema"] == 1)
+
+    bench.raw.before = before
+    run(bench.plan, bench.devices, out)
+    assert seen == [True]
+
+
+def test_an_existing_run_is_never_overwritten(bench, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    run(bench.plan, bench.devices, out)
+    before = (out / "steps.jsonl").read_bytes()
+    with pytest.raises(StoreError, match="holds a run already"):
+        run(bench.plan, bench.devices, out)
+    with pytest.raises(StoreError, match="is finished"):
+        run(bench.plan, bench.devices, out, resume=True)
+    assert (out / "steps.jsonl").read_bytes() == before
+
+
+def test_a_gap_that_the_stage_refuses_moves_nothing(bench, tmp_path: Path) -> None:
+    bench.plan.model.gaps_mm.append(30.0)
+    with pytest.raises(InterlockError):
+        run(bench.plan, bench.devices, tmp_path / "out")
+    assert bench.raw.calls == ["connect"]
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("phase", ["home", "move", "settle", "flux", "photograph"])
+def test_ctrl_c_in_each_phase_holds_and_ends_as_abort(
+    make_bench, tmp_path: Path, phase: str, monkeypatch
+) -> None:
+    bench = make_bench()
+    out = tmp_path / "out"
+
+    def interrupt(*_args, **_kwargs):
+        raise KeyboardInterrupt
+
+    if phase == "home":
+        bench.raw.before = lambda c: interrupt() if c == "home" else None
+    elif phase == "move":
+        bench.raw.before = lambda c: interrupt() if c.startswith("move -90") else None
+    elif phase == "settle":
+        monkeypatch.setattr("magbend.rig.runner.settle", interrupt)
+    elif phase == "flux":
+        bench.meter.read_flux = interrupt
+    else:
+        monkeypatch.setattr("magbend.rig.runner.grab_median", interrupt)
+    summary = run(bench.plan, bench.devices, out)
+    assert summary.status == "abort"
+    assert bench.raw.calls[-1] == "hold"
+    assert read_run(out).status == "abort"
+    assert verify_run(out) == []
+    assert len(read_run(out).steps) == (1 if phase == "move" else 0)
+
+
+def test_a_second_ctrl_c_stops_at_once(bench, tmp_path: Path) -> None:
+    def before(call: str) -> None:
+        if call.startswith("move -90") or call == "hold":
+            raise KeyboardInterrupt
+
+    bench.raw.before = before
+    summary = run(bench.plan, bench.devices, tmp_path / "out")
+    assert summary.status == "abort"
+    assert bench.raw.calls[-2:] == ["hold", "stop"]
+
+
+def test_retract_policy_moves_away_after_the_ending(
+    bench, tmp_path: Path, plan_file: Path
+) -> None:
+    plan_file.write_text(plan_file.read_text() + '[abort]\npolicy = "retract"\n')
+    from magbend.rig.config import read_plan
+
+    def before(call: str) -> None:
+        if call == "move -90":
+            bench.raw.before = lambda call: None
+            raise KeyboardInterrupt
+
+    bench.raw.before = before
+    run(read_plan(plan_file), bench.devices, tmp_path / "out")
+    assert bench.raw.calls[-1] == "move -1"
+
+
+def test_link_lost_ends_as_fail_and_stays_stopped(bench, tmp_path: Path) -> None:
+    def before(call: str) -> None:
+        if call == "move -90" or call == "hold":
+            raise LinkLostError("the port is gone")
+
+    bench.raw.before = before
+    out = tmp_path / "out"
+    summary = run(bench.plan, bench.devices, out)
+    assert (summary.status, summary.reason) == ("fail", "the port is gone")
+    assert summary.steps_done == 1
+    assert not any(c.startswith("move -100") for c in bench.raw.calls)
+    assert verify_run(out) == []
+
+
+def test_camera_stall_ends_as_fail(make_bench, tmp_path: Path) -> None:
+    bench = make_bench(camera={"faults": {9: "stall"}})
+    out = tmp_path / "out"
+    summary = run(bench.plan, bench.devices, out)
+    assert summary.status == "fail"
+    assert "twin camera" in summary.reason
+    assert verify_run(out) == []
+
+
+def test_overload_and_silence_are_flags_not_numbers(make_bench, tmp_path: Path) -> None:
+    bench = make_bench(meter={"overload_mT": 60.0, "silent_gaps_mm": [60.0]})
+    out = tmp_path / "out"
+    summary = run(bench.plan, bench.devices, out)
+    steps = read_run(out).steps
+    assert summary.status == "success"
+    assert [s["flux_status"] for s in steps] == ["ok", "silent", "overload"]
+    assert [s["flux_mT"] is None for s in steps] == [False, True, True]
+    assert summary.flagged == ("step 1: flux_silent", "step 2: flux_overload")
+
+
+def test_a_rod_that_never_rests_is_flagged(make_bench, tmp_path: Path) -> None:
+    bench = make_bench(camera={"swing_mm": 4.0, "damping_s": 1e9})
+    summary = run(bench.plan, bench.devices, tmp_path / "out")
+    assert summary.status == "success"
+    assert "step 0: settle_timeout" in summary.flagged
+
+
+def test_a_lamp_that_fails_is_flagged(make_bench, tmp_path: Path) -> None:
+    frames = dict.fromkeys(range(12, 60), "dark")
+    bench = make_bench(camera={"faults": frames})
+    summary = run(bench.plan, bench.devices, tmp_path / "out")
+    assert "step 2: brightness_drift" in summary.flagged
+
+
+def test_a_photograph_during_motion_is_not_recorded(bench, tmp_path: Path) -> None:
+    flux = bench.meter.read_flux
+
+    def push(samples: int, *, gap_mm: float):
+        if gap_mm == 60.0:
+            bench.raw.machine_mm += 0.5
+        return flux(samples, gap_mm=gap_mm)
+
+    bench.meter.read_flux = push
+    summary = run(bench.plan, bench.devices, tmp_path / "out")
+    assert summary.status == "fail"
+    assert "must stand at" in summary.reason
+    assert summary.steps_done == 1
+
+
+def test_a_defect_of_ours_still_ends_the_run(bench, tmp_path: Path) -> None:
+    def broken(*_args, **_kwargs):
+        raise ZeroDivisionError("oops")
+
+    bench.meter.read_flux = broken
+    with pytest.raises(ZeroDivisionError):
+        run(bench.plan, bench.devices, tmp_path / "out")
+    assert read_run(tmp_path / "out").end["reason"].startswith("internal error")
+
+
+def test_camera_error_is_a_camera_error(make_bench) -> None:
+    bench = make_bench(camera={"faults": {1: "stall"}})
+    with pytest.raises(CameraError):
+        bench.camera.grab_after(0.0)
