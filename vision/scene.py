@@ -201,6 +201,24 @@ def render_scene(
     ndarray of uint8, shape (h, w, 3)
         Blue, green, red in sRGB.
     """
+    return expose(paint_scene(scene, camera), scene.light, rng)
+
+
+def paint_scene(scene: Scene, camera: Calibration) -> Picture:
+    """Return the light of a scene before lens and sensor: the slow, repeatable part.
+
+    Parameters
+    ----------
+    scene : Scene
+        What lies on the paper.
+    camera : Calibration
+        The camera, exactly (see `scene_camera`).
+
+    Returns
+    -------
+    ndarray of float32, shape (h, w, 3)
+        Linear blue, green, red; `expose` makes a photograph of it.
+    """
     light = scene.light
     picture = _paper(scene, camera)
     blocks = (scene.clamp, *scene.blocks)
@@ -216,7 +234,7 @@ def render_scene(
         _draw_rod(picture, scene, camera)
     for block in blocks:
         _draw_top(picture, block, camera)
-    return _expose(picture, light, rng)
+    return picture
 
 
 def render_board(
@@ -253,7 +271,7 @@ def render_board(
     pixels = [camera.to_px(_subdivide(outline)) for outline in outlines]
     ink = coverage_of(pixels, signs, *camera.image_size_px)
     _paint(picture, ink, (0.035, 0.035, 0.035))
-    return _expose(picture, lit, rng)
+    return expose(picture, lit, rng)
 
 
 def _paper(scene: Scene, camera: Calibration) -> Picture:
@@ -391,7 +409,7 @@ def _draw_gloss(
     picture += np.float32(scene.light.gloss) * soft[..., None]
 
 
-def _expose(
+def expose(
     picture: Picture, light: SceneLight, rng: np.random.Generator
 ) -> NDArray[np.uint8]:
     """Blur, add the noise of light (its root) and of the sensor, and encode."""
