@@ -12,6 +12,9 @@ from .fields import (
     Support,
     UniformField,
 )
+from .magnet_field import magnet_flux_mT, magnet_gradient_mT_per_mm
+from .solve import solve
+from .table1 import gmc
 
 __all__ = [
     "PULLED_IN",
@@ -22,4 +25,8 @@ __all__ = [
     "Solution",
     "Support",
     "UniformField",
+    "gmc",
+    "magnet_flux_mT",
+    "magnet_gradient_mT_per_mm",
+    "solve",
 ]

@@ -1,0 +1,310 @@
+"""The march of the planar rod from its free tip: Taylor steps and their derivatives.
+
+Everything here is dimensionless: lengths over the rod's length L, moments over
+EI_ref / L, forces over EI_ref / L^2, fields in T. With sigma = L - s the rod obeys
+
+    theta' = e q,  q' = Px sin(theta) - Py cos(theta),  x' = -cos,  y' = -sin,  P' = w
+
+where e = EI_ref / EI, q = -M and P is the pole load: m B(r_tip) beyond the last joint,
+plus (m_left - m_right) B(r_joint) at each joint on the way to the root, plus the weight
+of what lies beyond. This is exact (DESIGN, section 5): because curl B = 0, the
+distributed torque m t x B and the gradient force m grad(t . B) together act as these
+dead loads.
+
+The march runs in a frame turned by `phi`, the direction of the tip's load, and its
+first unknown is gamma = theta_L - phi: in a strong field gamma is exponentially small,
+and only as a number of its own, not as a difference of angles, does it keep its digits.
+
+A rod is an array (n, 5), tip first: length h, compliance e, magnetic load m per tesla
+and weight per length wx, wy. A field is an array (17,): 0 and (Bx, By), or 1 and the
+magnet's block (`magnet_field.magnet_block`) in lengths of L. The state X, shape (9,),
+holds theta, q, x, y, Px, Py and what acts within a section: e, wx, wy. The columns D,
+shape (9, c), hold its derivatives.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from .magnet_field import plane_flux
+
+UNIFORM = 0.0
+CUBOID = 1.0
+H, E, M, WX, WY = 0, 1, 2, 3, 4
+"""Columns of a rod."""
+STATE = 9
+"""Length of the state and rows of the column array."""
+MAX_ORDER = 24
+SERIES = 4
+"""Series kept of a step: theta, q, sin, cos; and the same of every column."""
+
+
+@njit(cache=True)
+def field_at(field, x, y):  # type: ignore[no-untyped-def]
+    """Return (Bx, By, Gxx, Gxy, Gyy) of a field array."""
+    if field[0] == 0.0:
+        return field[1], field[2], 0.0, 0.0, 0.0
+    return plane_flux(field[1:], x, y)
+
+
+@njit(cache=True)
+def taylor_step(h, order, X, D, columns, T, C):  # type: ignore[no-untyped-def]
+    """Advance state X and columns D by `h`, leaving the series in T and C.
+
+    Parameters
+    ----------
+    h : float
+        Length of the step.
+    order : int
+        Order of the series.
+    X : ndarray, shape (9,)
+        The state.
+    D : ndarray, shape (9, columns or more)
+        Derivatives of the state.
+    columns : int
+        How many columns of D are in use.
+    T : ndarray, shape (4, order + 1 or more)
+        Series of theta, q, sin, cos in powers of tau / h.
+    C : ndarray, shape (order + 1 or more, 4, columns or more)
+        Series of the columns.
+    """
+    he = h * X[6]
+    px = h * X[4]
+    py = h * X[5]
+    wx = h * h * X[7]
+    wy = h * h * X[8]
+    T[0, 0] = X[0]
+    T[1, 0] = X[1]
+    T[2, 0] = math.sin(X[0])
+    T[3, 0] = math.cos(X[0])
+    for k in range(order):
+        f = 1.0 / (k + 1)
+        push = px * T[2, k] - py * T[3, k]
+        if k > 0:
+            push += wx * T[2, k - 1] - wy * T[3, k - 1]
+        sine = 0.0
+        cosine = 0.0
+        for j in range(k + 1):
+            sine += T[1, j] * T[3, k - j]
+            cosine += T[1, j] * T[2, k - j]
+        T[0, k + 1] = he * T[1, k] * f
+        T[1, k + 1] = push * f
+        T[2, k + 1] = he * sine * f
+        T[3, k + 1] = -he * cosine * f
+    if columns > 0:
+        _column_step(h, order, X, D, columns, T, C)
+    theta = q = x = y = 0.0
+    for k in range(order, 0, -1):
+        theta += T[0, k]
+        q += T[1, k]
+        x += T[3, k - 1] / k
+        y += T[2, k - 1] / k
+    X[0] += theta
+    X[1] += q
+    X[2] -= h * x
+    X[3] -= h * y
+    X[4] += h * X[7]
+    X[5] += h * X[8]
+
+
+@njit(cache=True)
+def _column_step(h, order, X, D, columns, T, C):  # type: ignore[no-untyped-def]
+    """Advance the columns over one step whose own series is in T."""
+    he = h * X[6]
+    px = h * X[4]
+    py = h * X[5]
+    wx = h * h * X[7]
+    wy = h * h * X[8]
+    for a in range(columns):
+        C[0, 0, a] = D[0, a]
+        C[0, 1, a] = D[1, a]
+    for k in range(order):
+        for a in range(columns):
+            C[k, 2, a] = 0.0
+            C[k, 3, a] = 0.0
+        for j in range(k + 1):
+            c = T[3, k - j]
+            s = T[2, k - j]
+            for a in range(columns):
+                C[k, 2, a] += c * C[j, 0, a]
+                C[k, 3, a] -= s * C[j, 0, a]
+        f = 1.0 / (k + 1)
+        s0 = h * T[2, k]
+        c0 = h * T[3, k]
+        hq = h * T[1, k]
+        for a in range(columns):
+            push = px * C[k, 2, a] - py * C[k, 3, a] + D[4, a] * s0 - D[5, a] * c0
+            if k > 0:
+                push += wx * C[k - 1, 2, a] - wy * C[k - 1, 3, a]
+                push += h * h * (D[7, a] * T[2, k - 1] - D[8, a] * T[3, k - 1])
+            C[k + 1, 0, a] = (he * C[k, 1, a] + hq * D[6, a]) * f
+            C[k + 1, 1, a] = push * f
+    for a in range(columns):
+        theta = q = x = y = 0.0
+        for k in range(order, 0, -1):
+            theta += C[k, 0, a]
+            q += C[k, 1, a]
+            x += C[k - 1, 3, a] / k
+            y += C[k - 1, 2, a] / k
+        D[0, a] += theta
+        D[1, a] += q
+        D[2, a] -= h * x
+        D[3, a] -= h * y
+        D[4, a] += h * D[7, a]
+        D[5, a] += h * D[8, a]
+
+
+@njit(cache=True)
+def substeps(h, X, step):  # type: ignore[no-untyped-def]
+    """Return how many Taylor steps a section needs.
+
+    The series converges up to about pi / 2 in units of 1 / sqrt(e P), the distance of
+    the pendulum's poles from the real axis; `step` is what one step takes, in the same
+    units.
+    """
+    e = X[6]
+    p0 = math.hypot(X[4], X[5])
+    p1 = math.hypot(X[4] + h * X[7], X[5] + h * X[8])
+    z = h * math.sqrt(e * max(p0, p1) + 0.25 * e * e * X[1] * X[1])
+    return max(1, math.ceil(z / step))
+
+
+@njit(cache=True)
+def start(rod, field, load, u, columns, X, D):  # type: ignore[no-untyped-def]
+    """Set state and columns at the tip, in a frame turned into the tip's load.
+
+    u = (gamma, x_L, y_L, phi): gamma and phi are updated to the load at (x_L, y_L).
+    """
+    b = field_at(field, u[1], u[2])
+    scale = load * rod[0, M]
+    size = abs(scale) * math.hypot(b[0], b[1])
+    if size > 0.0:
+        turn = math.atan2(scale * b[1], scale * b[0]) - u[3]
+        turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
+        u[0] -= turn
+        u[3] += turn
+    X[:] = 0.0
+    X[0] = u[0]
+    X[4] = size
+    D[:, :] = 0.0
+    if columns > 0:
+        D[0, 0] = 1.0
+    if columns > 1:
+        cf = math.cos(u[3])
+        sf = math.sin(u[3])
+        D[2, 1] = cf
+        D[3, 1] = -sf
+        D[2, 2] = sf
+        D[3, 2] = cf
+        move_load(scale, rod[0, M], b, cf, sf, columns, D)
+
+
+@njit(cache=True)
+def move_load(scaled, m, b, cf, sf, columns, D):  # type: ignore[no-untyped-def]
+    """Add to the columns how a load m B(r) changes as its point moves with the rod.
+
+    Column 3, if in use, is the derivative with respect to the load factor.
+    """
+    for a in range(columns):
+        dx = cf * D[2, a] - sf * D[3, a]
+        dy = sf * D[2, a] + cf * D[3, a]
+        fx = scaled * (b[2] * dx + b[3] * dy)
+        fy = scaled * (b[3] * dx + b[4] * dy)
+        if a == 3:
+            fx += m * b[0]
+            fy += m * b[1]
+        D[4, a] += cf * fx + sf * fy
+        D[5, a] += cf * fy - sf * fx
+
+
+@njit(cache=True)
+def enter_section(rod, i, load, cf, sf, columns, X, D):  # type: ignore[no-untyped-def]
+    """Set what acts within section `i`: compliance and weight, turned by -phi."""
+    wx = cf * rod[i, WX] + sf * rod[i, WY]
+    wy = cf * rod[i, WY] - sf * rod[i, WX]
+    X[6] = rod[i, E]
+    X[7] = load * wx
+    X[8] = load * wy
+    if columns > 3:
+        D[7, 3] = wx
+        D[8, 3] = wy
+
+
+@njit(cache=True)
+def cross_joint(rod, field, i, load, u, cf, sf, columns, X, D):  # type: ignore[no-untyped-def]
+    """Add the load of the joint between sections `i` and `i + 1` (root side)."""
+    m = rod[i + 1, M] - rod[i, M]
+    if m == 0.0:
+        return
+    x = u[1] + cf * X[2] - sf * X[3]
+    y = u[2] + sf * X[2] + cf * X[3]
+    b = field_at(field, x, y)
+    fx = load * m * b[0]
+    fy = load * m * b[1]
+    X[4] += cf * fx + sf * fy
+    X[5] += cf * fy - sf * fx
+    if columns > 1:
+        move_load(load * m, m, b, cf, sf, columns, D)
+
+
+@njit(cache=True)
+def march(rod, field, load, u, order, step, columns, X, D, T, C):  # type: ignore[no-untyped-def]
+    """March from the tip to the root.
+
+    Parameters
+    ----------
+    rod, field : ndarray
+        See the module's docstring.
+    load : float
+        Factor on all loads, from 0 to 1.
+    u : ndarray, shape (4,)
+        gamma, x_L, y_L and phi; gamma and phi are updated to the tip's load.
+    order, step : int, float
+        Order of the series, and what one step takes (`substeps`).
+    columns : int
+        0: none. 1: d/dgamma. 4: also d/dx_L, d/dy_L and d/dload.
+    X : ndarray, shape (9,)
+        On return the state at the root; positions count from the tip, turned by -phi.
+    D : ndarray, shape (9, 4)
+        On return its columns; those of the position count from the origin.
+    T, C : ndarray
+        Work space of `taylor_step`.
+
+    Returns
+    -------
+    int
+        Number of sign changes of the Jacobi determinant on (0, L]: the Morse index, if
+        this is an equilibrium. (The variations of rods clamped at s form nested spaces
+        as s falls from L to 0, so each zero adds one unstable direction.)
+    """
+    start(rod, field, load, u, columns, X, D)
+    cf = math.cos(u[3])
+    sf = math.sin(u[3])
+    zeros = 0
+    positive = True
+    for i in range(rod.shape[0]):
+        enter_section(rod, i, load, cf, sf, columns, X, D)
+        n = substeps(rod[i, H], X, step)
+        h = rod[i, H] / n
+        for _ in range(n):
+            taylor_step(h, order, X, D, columns, T, C)
+            if columns > 0 and (jacobi(D, columns) > 0.0) != positive:
+                positive = not positive
+                zeros += 1
+        if i + 1 < rod.shape[0]:
+            cross_joint(rod, field, i, load, u, cf, sf, columns, X, D)
+    return zeros
+
+
+@njit(cache=True)
+def jacobi(D, columns):  # type: ignore[no-untyped-def]
+    """Return the determinant of (theta, x, y) by (gamma, x_L, y_L)."""
+    if columns == 1:
+        return D[0, 0]
+    return (
+        D[0, 0] * (D[2, 1] * D[3, 2] - D[2, 2] * D[3, 1])
+        - D[0, 1] * (D[2, 0] * D[3, 2] - D[2, 2] * D[3, 0])
+        + D[0, 2] * (D[2, 0] * D[3, 1] - D[2, 1] * D[3, 0])
+    )

@@ -1,0 +1,138 @@
+"""`solve`: one rod, one field, one equilibrium."""
+
+from __future__ import annotations
+
+from ..core.centreline import Centreline
+from ..core.errors import InputError, SolverError
+from ..core.specimen import Specimen
+from ..core.units import mT_from_T, rad_from_deg
+from .fields import (
+    PULLED_IN,
+    STABLE,
+    UNSTABLE,
+    Field,
+    Solution,
+    Support,
+    UniformField,
+)
+from .planar import GONE, ORDER, STEP, TOO_STRONG, TOUCHES, solve_planar
+from .scaling import field_array, rod_array, stations, stiffness_Nmm2
+
+STATUS = (STABLE, UNSTABLE, PULLED_IN)
+NO_SUPPORT = Support()
+
+
+def solve(
+    specimen: Specimen,
+    field: Field,
+    *,
+    support: Support = NO_SUPPORT,
+    model: str = "rod",
+    poisson_ratio: float = 0.49,
+    points: int = 61,
+) -> Solution:
+    """Return the equilibrium that the rod reaches when its load grows from zero.
+
+    Parameters
+    ----------
+    specimen : Specimen
+        The rod.
+    field : UniformField or MagnetField
+        What bends it.
+    support : Support
+        Clamp direction, weight, and a factor on the magnetic load.
+    model : {"rod", "solid"}
+        Plain inextensible rod, or a rod with shear, stretch and the clamped face of a
+        solid (`solid`).
+    poisson_ratio : float
+        Of the material; only the solid model knows it.
+    points : int
+        Number of points of the shape, equally spaced from clamp to tip.
+
+    Returns
+    -------
+    Solution
+        With its status, Morse index and error bound. "pulled in: no equilibrium" is a
+        result: the branch from zero load ends before the full load, or touches the
+        magnet.
+
+    Raises
+    ------
+    InputError
+        If a value cannot be, or the undeformed rod would touch the magnet.
+    SolverError
+        If no answer was found that could be vouched for.
+
+    Examples
+    --------
+    >>> from magbend.sim import UniformField, gmc, solve
+    >>> solution = solve(gmc(2), UniformField(flux_mT=50.0))
+    >>> [round(value, 5) for value in solution.centreline.tip_mm]
+    [29.53532, 4.70952]
+    """
+    if model == "solid":
+        from .solid import solve_solid
+
+        return solve_solid(
+            specimen, field, support=support, poisson_ratio=poisson_ratio, points=points
+        )
+    if model != "rod":
+        raise InputError(f"model must be 'rod' or 'solid'; instead received {model!r}")
+    if not (support.in_plane and (isinstance(field, UniformField) or field.in_plane)):
+        from .spatial import solve_spatial
+
+        return solve_spatial(specimen, field, support=support, points=points)
+    rod = rod_array(specimen, support)
+    length_mm = specimen.length_mm
+    margin = 0.5 * max(specimen.sides_mm) / length_mm
+    s = stations(points)
+    outcome, index, load, error, bx, by, moment, table = solve_planar(
+        rod,
+        field_array(field, length_mm),
+        rad_from_deg(support.clamp_angle_deg),
+        margin,
+        s,
+        ORDER,
+        STEP,
+    )
+    if outcome > GONE:
+        raise _failure(outcome, specimen, field, load)
+    centreline = None
+    if outcome != GONE:
+        centreline = Centreline(
+            s_mm=s * length_mm,
+            x_mm=table[0] * length_mm,
+            y_mm=table[1] * length_mm,
+            theta_rad=table[2],
+            kappa_per_mm=table[3] / length_mm,
+        )
+    return Solution(
+        centreline=centreline,
+        status=STATUS[outcome],
+        morse_index=index if centreline else -1,
+        error_mm=error * length_mm if centreline else float("nan"),
+        flux_tip_mT=(mT_from_T(bx), mT_from_T(by)),
+        root_moment_Nm=moment * stiffness_Nmm2(specimen)[0] / length_mm * 1e-3,
+        load_limit=load,
+    )
+
+
+def _failure(
+    outcome: int, specimen: Specimen, field: Field, load: float
+) -> InputError | SolverError:
+    if outcome == TOUCHES:
+        gap_mm = getattr(field, "gap_mm", float("nan"))
+        return InputError(
+            f"gap_mm must leave the undeformed rod {specimen.name!r} clear of the "
+            f"magnet, with half its side to spare; instead received {gap_mm:g} mm"
+        )
+    if outcome == TOO_STRONG:
+        return InputError(
+            "the load on the rod (flux_mT, remanence_mT, weight) must be less than "
+            "40000 times its stiffness EI / L^2; instead received one beyond it: "
+            "check the units of E_MPa, side_mm and flux_mT"
+        )
+    return SolverError(
+        f"no equilibrium of {specimen.name!r} could be followed beyond "
+        f"{load:.3g} of its load; try a smaller flux_mT or a larger gap_mm"
+    )
