@@ -2,10 +2,414 @@
 
 from __future__ import annotations
 
-from .console import group
+import math
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from ..core.errors import InputError
+from .console import group, print_json, progress
+
+if TYPE_CHECKING:
+    from ..vision.board import Board
+    from ..vision.calibration import Calibration
 
 app = group(
     "vision",
     "Photographs to calibrated centrelines in mm.",
     "magbend vision extract photo.png --calibration calibration.json --out measured",
 )
+
+_BOARD = typer.Option("7x5", "--board", help="Squares across and down.")
+_SQUARE = typer.Option(10.0, "--square-mm", help="Side of a square, as designed.")
+_MARKER = typer.Option(7.5, "--marker-mm", help="Side of a marker, as designed.")
+_DICTIONARY = typer.Option("DICT_4X4_50", "--dictionary", help="OpenCV's name of it.")
+
+
+@app.command(epilog="Example: magbend vision board --out board.pdf")
+def board(
+    out: Path = typer.Option(..., "--out", help="The file: .pdf or .png."),
+    squares: str = _BOARD,
+    square_mm: float = _SQUARE,
+    marker_mm: float = _MARKER,
+    dictionary: str = _DICTIONARY,
+    dpi: int = typer.Option(600, "--dpi", help="Resolution of a .png."),
+) -> None:
+    """Write the ChArUco board to print."""
+    from ..vision.board import Board
+    from ..vision.board_print import write_board
+
+    columns, rows = _two_numbers(squares, "--board")
+    design = Board(
+        columns=columns,
+        rows=rows,
+        square_mm=square_mm,
+        marker_mm=marker_mm,
+        dictionary=dictionary,
+    )
+    write_board(design, out, dpi=dpi)
+    width, height = design.size_mm
+    typer.echo(
+        f"{out}: {design.describe().split(', printed')[0]}; {width:g} x {height:g} mm. "
+        "Print at 100 %, then measure it with a calliper for --print-scale."
+    )
+
+
+@app.command(
+    epilog="Example: magbend vision calibrate plane.png tilted1.png tilted2.png "
+    "--out calibration.json --rod-height-mm 0.9"
+)
+def calibrate(
+    plane: Path = typer.Argument(..., help="The board in the measuring plane."),
+    lens: list[Path] = typer.Argument(
+        None, help="The board tilted in different ways, for the lens."
+    ),
+    out: Path = typer.Option(..., "--out", help="The calibration file (JSON)."),
+    squares: str = _BOARD,
+    square_mm: float = _SQUARE,
+    marker_mm: float = _MARKER,
+    dictionary: str = _DICTIONARY,
+    chessboard: str = typer.Option(
+        None, "--chessboard", help="A plain chessboard: inner corners, such as 9x6."
+    ),
+    legacy: bool = typer.Option(
+        False, "--legacy-pattern", help="A board with even rows made before OpenCV 4.6."
+    ),
+    print_scale: float = typer.Option(
+        1.0, "--print-scale", help="Measured over nominal length of the print."
+    ),
+    rod_height_mm: float = typer.Option(
+        0.0, "--rod-height-mm", help="Height of the rod's axis above the board's plane."
+    ),
+    camera_height_mm: float = typer.Option(
+        None, "--camera-height-mm", help="Lens to plane, if you measured it (2 %)."
+    ),
+    focal_px: float = typer.Option(
+        None, "--focal-px", help="Focal length in pixels, if you know it."
+    ),
+    known_length: str = typer.Option(
+        None, "--known-length",
+        help="No board: 'X1,Y1 X2,Y2 MM', two pixels and the length between them.",
+    ),
+    scale_mm_per_px: float = typer.Option(
+        None, "--scale-mm-per-px", help="No board: the scale itself."
+    ),
+    json_output: bool = typer.Option(False, "--json", help="Print JSON."),
+) -> None:  # fmt: skip
+    """Calibrate a camera from photographs of the board."""
+    from ..vision.calibrate import calibrate as calibrate_photos
+    from ..vision.photo import read_photo
+
+    if known_length or scale_mm_per_px is not None:
+        if known_length and scale_mm_per_px is not None:
+            raise typer.BadParameter("give --known-length or --scale-mm-per-px")
+        result = _without_board(
+            plane, known_length, scale_mm_per_px, camera_height_mm, rod_height_mm
+        )
+    else:
+        columns, rows = _two_numbers(
+            chessboard or squares, "--chessboard" if chessboard else "--board"
+        )
+        design = _design(
+            columns, rows, square_mm, marker_mm, dictionary, print_scale,
+            legacy=legacy, plain=bool(chessboard),
+        )  # fmt: skip
+        result = calibrate_photos(
+            read_photo(plane),
+            [read_photo(path) for path in lens or []],
+            board=design,
+            rod_height_mm=rod_height_mm,
+            camera_height_mm=camera_height_mm,
+            focal_px=focal_px,
+        )
+    result.save(out)
+    facts = _calibration_facts(result)
+    if json_output:
+        print_json({"calibration": str(out), **facts})
+        return
+    _tell_calibration(result, facts, out)
+
+
+@app.command(
+    epilog="Example: magbend vision extract runs/gmc2 --calibration calibration.json "
+    "--rod-height-mm 0.9 --out measured"
+)
+def extract(
+    images: list[Path] = typer.Argument(
+        ..., help="Photographs, folders, runs or videos."
+    ),
+    calibration: Path = typer.Option(
+        None, "--calibration",
+        help="From `vision calibrate`; default: the run's own. Without one: pixels.",
+    ),
+    out: Path = typer.Option(
+        None, "--out", help="Folder for the results; default: the run, or 'measured'."
+    ),
+    rod_height_mm: float = typer.Option(
+        None, "--rod-height-mm",
+        help="Height of the rod's axis above the board's plane; default: the "
+        "calibration's.",
+    ),
+    invert: bool = typer.Option(
+        None, "--invert/--no-invert",
+        help="Light rod on dark ground; default: found out.",
+    ),
+    length_mm: float = typer.Option(
+        None, "--length-mm", help="Nominal length, to check against."
+    ),
+    joints_mm: str = typer.Option(
+        "", "--joints-mm", help="Where the stiffness jumps, such as 10,20."
+    ),
+    bare: Path = typer.Option(
+        None, "--bare", help="The paper alone, to divide the light out."
+    ),
+    edges: Path = typer.Option(
+        None, "--edges", help="Write the side-edge points too (CSV)."
+    ),
+    figure_steps: Path = typer.Option(
+        None, "--figure-steps",
+        help="Draw the processing steps of the first measured photograph (.pdf, .png).",
+    ),
+    overlays: bool = typer.Option(
+        True, "--overlays/--no-overlays", help="Draw what was found."
+    ),
+    workers: int = typer.Option(0, "--workers", min=0, help="Processes; 0: by itself."),
+    resume: bool = typer.Option(
+        False, "--resume", help="Keep what is measured already, with these settings."
+    ),
+    json_output: bool = typer.Option(False, "--json", help="Print JSON."),
+) -> None:  # fmt: skip
+    """Measure the rod's centreline in photographs."""
+    from ..vision.batch import extract_files
+    from ..vision.inputs import list_sources
+
+    sources = list_sources(images)
+    run = _only_run(images)
+    if calibration is None and run is not None:
+        own = run / "calibration.json"
+        calibration = own if own.exists() else None
+    folder = out or run or Path("measured")
+    settings = _settings(
+        calibration, rod_height_mm, invert, length_mm, _numbers(joints_mm), bare
+    )
+    with progress("photographs") as report:
+        result = extract_files(
+            images,
+            folder,
+            settings=settings,
+            overlays=overlays,
+            edges=edges,
+            workers=workers or _workers(len(sources)),
+            resume=resume,
+            progress=report,
+        )
+    if figure_steps is not None:
+        from ..vision.figures import figure_of_steps
+        from ..vision.inputs import read_source
+
+        index = next(i for i, frame in enumerate(result.frames) if frame.ok)
+        figure_of_steps(read_source(sources[index]), settings, figure_steps)
+    _tell_frames(result, json_output=json_output)
+
+
+def _two_numbers(text: str, option: str) -> tuple[int, int]:
+    match = re.fullmatch(r"\s*(\d{1,3})\s*[xX*]\s*(\d{1,3})\s*", text)
+    if match is None:
+        raise InputError(
+            f"{option} must be two numbers such as 7x5; instead received {text!r}"
+        )
+    return int(match.group(1)), int(match.group(2))
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    try:
+        values = tuple(float(part) for part in text.split(",") if part.strip())
+    except ValueError:
+        values = (math.nan,)
+    if not all(math.isfinite(value) and value > 0.0 for value in values):
+        raise InputError(
+            "--joints-mm must be lengths in mm such as 10,20; "
+            f"instead received {text!r}"
+        )
+    return tuple(sorted(values))
+
+
+def _design(
+    columns: int, rows: int, square_mm: float, marker_mm: float, dictionary: str,
+    print_scale: float, *, legacy: bool, plain: bool,
+) -> Board:  # fmt: skip
+    from ..vision.board import Board
+
+    return Board(
+        kind="chessboard" if plain else "charuco",
+        columns=columns,
+        rows=rows,
+        square_mm=square_mm,
+        marker_mm=marker_mm,
+        dictionary=dictionary,
+        print_scale=print_scale,
+        legacy=legacy,
+    )
+
+
+def _without_board(
+    plane: Path,
+    known_length: str | None,
+    scale_mm_per_px: float | None,
+    camera_height_mm: float | None,
+    rod_height_mm: float,
+) -> Calibration:
+    from ..core.checks import positive
+    from ..vision.calibrate import calibrate_known_length
+    from ..vision.calibration import scale_calibration
+    from ..vision.photo import read_photo
+
+    size_px = read_photo(plane).size_px
+    if scale_mm_per_px is not None:
+        return scale_calibration(
+            mm_per_px=positive(scale_mm_per_px, "--scale-mm-per-px", "mm/px"),
+            image_size_px=size_px,
+            camera_height_mm=camera_height_mm,
+            rod_height_mm=rod_height_mm,
+        )
+    try:
+        x1, y1, x2, y2, length_mm = (
+            float(part) for part in re.split(r"[,\s]+", (known_length or "").strip())
+        )
+    except ValueError:
+        raise InputError(
+            "--known-length must be 'X1,Y1 X2,Y2 MM', such as '120,300 1320,305 60'; "
+            f"instead received {known_length!r}"
+        ) from None
+    return calibrate_known_length(
+        size_px,
+        from_px=(x1, y1),
+        to_px=(x2, y2),
+        length_mm=length_mm,
+        camera_height_mm=camera_height_mm,
+        rod_height_mm=rod_height_mm,
+    )
+
+
+def _calibration_facts(result: Calibration) -> dict[str, Any]:
+    return {
+        "mm_per_px": result.mm_per_px(result.centre_px, height_mm=0.0),
+        "scale_relative_sd": result.scale_relative_sd,
+        "rms_px": result.rms_px,
+        "tilt_deg": result.tilt_deg,
+        "focal_px": result.focal_px[0],
+        "distortion": result.distortion,
+        "camera_height_mm": result.camera_height_mm,
+        "camera_height_sd_mm": result.camera_height_sd_mm,
+        "camera_height_source": result.camera_height_source,
+        "rod_height_mm": result.rod_height_mm,
+        "views": [
+            {
+                "name": view.name,
+                "rms_px": view.rms_px,
+                "corners": view.corners,
+                "used": view.used,
+                "why_not": view.why_not,
+            }
+            for view in result.views
+        ],
+    }
+
+
+def _tell_calibration(result: Calibration, facts: dict[str, Any], out: Path) -> None:
+    for view in result.views:
+        verdict = "used" if view.used else f"dropped: {view.why_not}"
+        typer.echo(
+            f"{view.name}: {view.corners} corners, RMS {view.rms_px:.3f} px, {verdict}"
+        )
+    typer.echo(f"scale {facts['mm_per_px']:.7f} mm/px, tilt {result.tilt_deg:.2f} deg")
+    if math.isfinite(result.camera_height_sd_mm):
+        height, sd = result.camera_height_mm, result.camera_height_sd_mm
+        typer.echo(
+            f"camera {height:.0f} +- {sd:.0f} mm above the plane "
+            f"({result.camera_height_source}); per mm of height the scale shrinks by "
+            f"{100.0 / height:.3f} +- {100.0 * sd / height**2:.3f} %"
+        )
+        if sd > 0.3 * height:
+            typer.echo(
+                "The camera's height is hardly known. If the rod lies above the "
+                "board's plane, give --camera-height-mm or add tilted photographs."
+            )
+    else:
+        typer.echo(f"camera height {result.camera_height_source}")
+    typer.echo(f"{out}: written")
+
+
+def _only_run(images: list[Path]) -> Path | None:
+    if len(images) == 1 and (images[0] / "run.json").exists():
+        return images[0]
+    return None
+
+
+def _settings(
+    calibration: Path | None,
+    rod_height_mm: float | None,
+    invert: bool | None,
+    length_mm: float | None,
+    joints_mm: tuple[float, ...],
+    bare: Path | None,
+) -> Any:
+    from ..core.checks import finite, positive
+    from ..vision.batch import Settings, read_bare
+    from ..vision.calibration import Calibration
+
+    known = None if calibration is None else Calibration.load(calibration)
+    if rod_height_mm is None:
+        rod_height_mm = 0.0 if known is None else known.rod_height_mm
+    return Settings(
+        calibration=known,
+        rod_height_mm=finite(rod_height_mm, "--rod-height-mm", "mm"),
+        invert=invert,
+        joints_mm=joints_mm,
+        length_mm=None
+        if length_mm is None
+        else positive(length_mm, "--length-mm", "mm"),
+        bare=None if bare is None else read_bare(bare),
+    )
+
+
+def _workers(pictures: int) -> int:
+    """Return how many processes are worth their start (about 2 s each)."""
+    import os
+
+    return 1 if pictures < 24 else max(1, os.cpu_count() or 1)
+
+
+def _tell_frames(result: Any, *, json_output: bool) -> None:
+    if json_output:
+        print_json(
+            {
+                "out": str(result.out),
+                "measured": result.measured,
+                "failed": len(result.frames) - result.measured,
+                "frames": [
+                    {
+                        "image": frame.image,
+                        "status": frame.status,
+                        "flags": frame.flags,
+                        "length_mm": frame.length_mm,
+                        "tip_mm": frame.tip_mm,
+                        "tip_angle_deg": frame.tip_angle_deg,
+                        "width_mm": frame.width_mm,
+                        "reason": frame.reason,
+                    }
+                    for frame in result.frames
+                ],
+            }
+        )
+        return
+    for frame in result.frames:
+        if not frame.ok:
+            typer.echo(f"{frame.image}: failed: {frame.reason}", err=True)
+        elif set(frame.flags) - {"uncalibrated"}:
+            typer.echo(f"{frame.image}: {', '.join(frame.flags)}", err=True)
+    typer.echo(
+        f"{result.out}: {result.measured} of {len(result.frames)} photographs measured"
+    )

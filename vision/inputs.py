@@ -1,0 +1,174 @@
+"""What to measure: files, folders, runs and videos as one list of named pictures."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from ..core.errors import VisionError
+from .photo import Photo, as_photo, read_photo
+
+PICTURES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"})
+VIDEOS = frozenset({".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm"})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Source:
+    """One picture to measure.
+
+    Parameters
+    ----------
+    image : str
+        Its name in the tables: the file's name, or ``video_000123`` for a frame.
+    path : Path
+        The file.
+    frame : int or None
+        Number of the frame in a video.
+    """
+
+    image: str
+    path: Path
+    frame: int | None = None
+
+    @property
+    def overlay(self) -> str:
+        """Name of its overlay."""
+        return f"{Path(self.image).stem if self.frame is None else self.image}.png"
+
+
+def list_sources(paths: Iterable[Path]) -> list[Source]:
+    """Return every picture that the user's paths mean, in their order.
+
+    A folder stands for its pictures sorted by name, a run for its ``images/*.png``, a
+    video for its frames. Files of the same name keep the name of their folder.
+
+    Raises
+    ------
+    VisionError
+        If a path is missing, a folder has no picture, or a video cannot be opened.
+    """
+    sources: list[Source] = []
+    for path in paths:
+        if path.is_dir():
+            sources.extend(_of_folder(path))
+        elif not path.exists():
+            raise VisionError(f"{path}: there is no such file")
+        elif path.suffix.lower() in VIDEOS:
+            sources.extend(_of_video(path))
+        else:
+            sources.append(Source(image=path.name, path=path))
+    if not sources:
+        raise VisionError(
+            "at least one photograph must be given; instead received none"
+        )
+    return _with_distinct_names(sources)
+
+
+def _of_folder(folder: Path) -> list[Source]:
+    is_run = (folder / "run.json").exists() or (folder / "steps.jsonl").exists()
+    within = folder / "images" if is_run else folder
+    suffixes = frozenset({".png"}) if is_run else PICTURES
+    found = (
+        sorted(
+            path
+            for path in within.iterdir()
+            if path.suffix.lower() in suffixes and not path.name.startswith(".")
+        )
+        if within.is_dir()
+        else []
+    )
+    if not found:
+        raise VisionError(f"{within}: this folder has no photographs")
+    return [Source(image=path.name, path=path) for path in found]
+
+
+def _of_video(path: Path) -> list[Source]:
+    video = cv2.VideoCapture(str(path))
+    try:
+        count = int(video.get(cv2.CAP_PROP_FRAME_COUNT)) if video.isOpened() else 0
+    finally:
+        video.release()
+    if count <= 0:
+        raise VisionError(f"{path}: this video cannot be opened or has no frames")
+    return [
+        Source(image=f"{path.stem}_{frame:06d}", path=path, frame=frame)
+        for frame in range(count)
+    ]
+
+
+def _with_distinct_names(sources: list[Source]) -> list[Source]:
+    unique = list(dict.fromkeys(sources))
+    stems = Counter(source.overlay for source in unique)
+    named = [
+        source
+        if stems[source.overlay] == 1
+        else replace(source, image=f"{source.path.parent.name}_{source.image}")
+        for source in unique
+    ]
+    if len({source.overlay for source in named}) < len(named):
+        # The same stem within one folder (a.png and a.jpg): number them.
+        named = [
+            replace(source, image=f"{index:04d}_{source.image}")
+            for index, source in enumerate(named)
+        ]
+    return named
+
+
+def read_source(source: Source) -> Photo:
+    """Read one picture.
+
+    Raises
+    ------
+    VisionError
+        If it cannot be read.
+    """
+    if source.frame is None:
+        return read_photo(source.path)
+    pixels = _video(source.path).read(source.frame)
+    if pixels is None:
+        raise VisionError(
+            f"{source.path.name}: frame {source.frame} cannot be decoded; "
+            "the video may be cut off"
+        )
+    return as_photo(pixels, source=source.image)
+
+
+def digest(source: Source) -> str:
+    """Return the SHA-256 of the file (of a video: with the number of the frame)."""
+    key = _file_digest(source.path, source.path.stat().st_mtime_ns)
+    return key if source.frame is None else f"{key}#{source.frame}"
+
+
+@cache
+def _file_digest(path: Path, _changed: int) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+class _Video:
+    """An open video that reads on without seeking where it can."""
+
+    def __init__(self, path: Path) -> None:
+        self._video: Any = cv2.VideoCapture(str(path))
+        self._next = 0
+
+    def read(self, frame: int) -> np.ndarray | None:
+        """Return one frame, blue green red; None where it cannot be decoded."""
+        if frame != self._next:
+            self._video.set(cv2.CAP_PROP_POS_FRAMES, frame)
+        found, pixels = self._video.read()
+        self._next = frame + 1
+        return np.asarray(pixels) if found else None
+
+
+@cache
+def _video(path: Path) -> _Video:
+    return _Video(path)
