@@ -25,6 +25,7 @@ class CameraConfig(FileModel):
 
     backend: Literal["auto", "opencv", "mjpeg", "folder", "video", "twin"] = "auto"
     source: str | int = 0
+    watch: bool = False
     width_px: PositiveInt | None = None
     height_px: PositiveInt | None = None
     exposure: float | None = None
@@ -44,7 +45,6 @@ class MeterConfig(FileModel):
     description: Path | None = None
     zero_mT: float = 0.0
     sign: Literal[-1, 1] = 1
-    max_flux_mT: PositiveFloat | None = None
 
 
 class SettleConfig(FileModel):

@@ -1,0 +1,151 @@
+"""From a rig file to open devices."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from ..core.errors import CameraError, ConfigError, MeterError
+from .camera import Camera
+from .capture import CaptureCamera, Source
+from .clock import Clock
+from .config import CameraConfig, MeterConfig
+from .link import WireLog
+from .meter import ManualMeter, Meter, NoMeter
+
+
+def open_camera(config: CameraConfig, folder: Path, clock: Clock) -> Camera:
+    """Open the camera of a rig file.
+
+    Parameters
+    ----------
+    config : CameraConfig
+        Its ``[camera]`` table.
+    folder : Path
+        The folder of the rig file: relative paths start there.
+    clock : Clock
+        Time.
+
+    Raises
+    ------
+    CameraError
+        If it cannot be opened or gives no picture.
+    ConfigError
+        If it is the twin's: that one is made by `magbend.analysis.twin`.
+    """
+    source = config.source
+    backend = (
+        config.backend if config.backend != "auto" else _backend_of(source, folder)
+    )
+    if backend == "twin":
+        raise ConfigError(
+            "camera.backend twin is the computed bench: it needs the twin's devices "
+            "(magbend.analysis.twin)"
+        )
+    if backend in ("folder", "video"):
+        return _open_files(config, backend, folder / str(source), clock)
+    make: Callable[[], Source]
+    if backend == "mjpeg":
+        from .camera_mjpeg import MjpegSource
+
+        url = str(source)
+        if not url.startswith(("http://", "https://")):
+            raise ConfigError(
+                f"camera.source must be an http:// or https:// address for the backend "
+                f"mjpeg; instead received {url!r}"
+            )
+        make = lambda: MjpegSource(url, clock, timeout_s=config.frame_timeout_s)  # noqa: E731
+    else:
+        from .camera_opencv import OpenCvSource
+
+        device = int(source) if str(source).isdigit() else source
+        make = lambda: OpenCvSource(device, config, clock)  # noqa: E731
+    return CaptureCamera(make, _without_password(str(source)), config, clock)
+
+
+def _open_files(config: CameraConfig, backend: str, path: Path, clock: Clock) -> Camera:
+    from .camera_files import FolderCamera, VideoCamera, WatchedFolderCamera
+
+    if backend == "video":
+        return VideoCamera(path, clock)
+    if config.watch:
+        return WatchedFolderCamera(path, clock, timeout_s=config.frame_timeout_s)
+    return FolderCamera(path, clock)
+
+
+def _backend_of(source: str | int, folder: Path) -> str:
+    text = str(source)
+    if text.startswith(("http://", "https://")):
+        return "mjpeg"
+    if text.isdigit() or "://" in text or text.startswith("/dev/"):
+        return "opencv"
+    path = folder / text
+    if path.is_dir():
+        return "folder"
+    if path.is_file():
+        return "video"
+    raise CameraError(
+        f"camera.source must be a device number, an address, a folder or a video; "
+        f"instead received {text!r}, and {path} does not exist"
+    )
+
+
+def _without_password(source: str) -> str:
+    scheme, separator, rest = source.partition("://")
+    return f"{scheme}{separator}{rest.rpartition('@')[2]}" if separator else source
+
+
+def open_meter(
+    config: MeterConfig,
+    folder: Path,
+    *,
+    readings_mT: Mapping[float, float] | None = None,
+    log: WireLog | None = None,
+) -> Meter:
+    """Open the Tesla-meter of a rig file.
+
+    Parameters
+    ----------
+    config : MeterConfig
+        Its ``[meter]`` table.
+    folder : Path
+        The folder of the rig file.
+    readings_mT : mapping of float to float, optional
+        Typed readings in mT per gap in mm; they replace the meter.
+    log : WireLog, optional
+        Where every byte is recorded.
+
+    Raises
+    ------
+    MeterError
+        If it cannot be opened or does not tell its unit.
+    ConfigError
+        If its description is wrong, or the port is missing.
+    """
+    if readings_mT is not None or config.driver == "manual":
+        return ManualMeter(readings_mT or {})
+    if config.driver == "none":
+        return NoMeter()
+    if config.driver == "twin":
+        raise ConfigError(
+            "meter.driver twin is the computed bench: it needs the twin's devices "
+            "(magbend.analysis.twin)"
+        )
+    from .meter_description import read_description
+    from .meter_serial import SerialMeter
+
+    path = folder / config.description if config.description else None
+    description = read_description(config.driver, path)
+    if not config.port:
+        raise MeterError(
+            f"meter.port must name the port of the {description.name}; "
+            f"`magbend rig ports` lists what is there"
+        )
+
+    def tap(direction: str, data: bytes) -> None:
+        if log is not None:
+            log.record("meter", direction, data)
+
+    return SerialMeter(
+        description, config.port, zero_mT=config.zero_mT, sign=config.sign, tap=tap
+    )
