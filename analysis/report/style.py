@@ -1,0 +1,125 @@
+"""How the figures look: one palette for screen, dark screen and print.
+
+Figures are drawn once. In the page their colours become CSS variables, so that one SVG
+serves light and dark; in the PDF beside it they stay as they are here. Colours are
+those of Okabe and Ito, told apart by people with any colour vision, and lines differ in
+dash as well, so that a grey print still works.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+INK = "#1b1f24"
+FAINT = "#8a929b"
+GRID = "#dfe3e8"
+MAGNET = "#0072b2"
+UNIFORM = "#d55e00"
+GOOD = "#009e73"
+BAD = "#cc3311"
+
+_VARIABLES = {
+    INK: "var(--ink)",
+    FAINT: "var(--faint)",
+    GRID: "var(--grid)",
+    MAGNET: "var(--magnet)",
+    UNIFORM: "var(--uniform)",
+    GOOD: "var(--good)",
+    BAD: "var(--bad)",
+}
+WIDTH_IN = 181.0 / 25.4
+"""Width of a two-column figure, 181 mm."""
+
+MODEL_COLOUR = {"uniform": UNIFORM, "magnet": MAGNET}
+MODEL_DASH = {"uniform": (4.0, 2.0), "magnet": (None, None)}
+MODEL_LABEL = {"uniform": "simulated, uniform field", "magnet": "simulated, magnet"}
+
+_RC = {
+    "font.family": "sans-serif",
+    "font.size": 8.0,
+    "axes.titlesize": 8.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.edgecolor": FAINT,
+    "axes.labelcolor": INK,
+    "axes.titlecolor": INK,
+    "axes.linewidth": 0.6,
+    "axes.grid": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.5,
+    "lines.linewidth": 1.2,
+    "lines.markersize": 2.6,
+    "text.color": INK,
+    "xtick.color": FAINT,
+    "ytick.color": FAINT,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 7.5,
+    "figure.facecolor": "none",
+    "axes.facecolor": "none",
+    "savefig.facecolor": "none",
+    "svg.fonttype": "none",
+    "svg.hashsalt": "magbend",
+    "pdf.fonttype": 42,
+    "pdf.compression": 9,
+}
+
+
+def drawing() -> AbstractContextManager[None]:
+    """Return a context in which figures are drawn in the house style."""
+    import matplotlib as mpl
+
+    return mpl.rc_context(_RC)
+
+
+def new_figure(height_mm: float) -> Figure:
+    """Return an empty figure 181 mm wide, of the given height."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(WIDTH_IN, height_mm / 25.4), layout="constrained")
+
+
+def to_pdf(figure: Figure) -> bytes:
+    """Return the figure as PDF: fonts embedded, no date, white paper."""
+    buffer = io.BytesIO()
+    with drawing():
+        figure.savefig(
+            buffer, format="pdf", facecolor="white", metadata={"CreationDate": None}
+        )
+    return buffer.getvalue()
+
+
+def to_svg(figure: Figure, name: str) -> str:
+    """Return the figure as SVG for the page: scalable, in the page's colours.
+
+    Parameters
+    ----------
+    name : str
+        Goes before every id, so that figures do not share any; must be unique.
+    """
+    buffer = io.StringIO()
+    with drawing():
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
+    text = re.sub(r"<!--.*?-->\s*", "", text, flags=re.DOTALL)
+    text = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{name}-", text)
+    text = re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1)
+    text = re.sub(r'(<svg[^>]*?) width="[^"]*"', r'\1 class="figure"', text, count=1)
+    text = re.sub(r"font: ([\d.]+)px [^;\"]+", r"font-size: \1px", text)
+    for colour, variable in _VARIABLES.items():
+        text = text.replace(colour, variable)
+    return text
