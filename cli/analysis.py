@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from . import analysis_model
 from .console import group
 
 app = group(
@@ -9,3 +10,5 @@ app = group(
     "Compare, fit, report, train, search and design.",
     "magbend analysis report runs/gmc2",
 )
+
+analysis_model.register(app)

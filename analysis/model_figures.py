@@ -1,0 +1,85 @@
+"""Figures of training, sensitivity and design: object API, fonts embedded."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..core.errors import InputError
+from ..core.files import write_bytes
+
+if TYPE_CHECKING:
+    from .expansion_train import TrainingReport
+
+SUFFIXES = (".svg", ".pdf", ".png")
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+"""Okabe and Ito's colour-blind safe set."""
+
+SPLIT_LABELS = {
+    "field": "a random field of each GMC",
+    "top_field": "120 mT of each GMC",
+    "specimen": "one whole GMC",
+}
+
+
+def new_figure(width_mm: float = 130.0, height_mm: float = 85.0) -> Any:
+    """Return an empty figure of a size in mm."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width_mm / 25.4, height_mm / 25.4), layout="constrained")
+
+
+def check_path(path: Path) -> Path:
+    """Return the path of a figure to come.
+
+    Raises
+    ------
+    InputError
+        If its suffix is none that can be drawn, or its folder is missing.
+    """
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(
+            f"a figure must end in {', '.join(SUFFIXES)}; instead received {path.name}"
+        )
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist")
+    return path
+
+
+def save_figure(figure: Any, path: Path) -> None:
+    """Write a figure, whole or not at all, the same bytes for the same data."""
+    import io
+
+    import matplotlib as mpl
+
+    check_path(path)
+    kind = path.suffix.lower()[1:]
+    dates = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}
+    settings = {"pdf.fonttype": 42, "svg.hashsalt": "magbend", "svg.fonttype": "none"}
+    buffer = io.BytesIO()
+    with mpl.rc_context(settings):
+        figure.savefig(buffer, format=kind, metadata=dates[kind], dpi=200)
+    write_bytes(path, buffer.getvalue())
+
+
+def training_figure(report: TrainingReport, published_per_mm2: float) -> Any:
+    """Draw the test error of every seed of every split, with the published one."""
+    figure = new_figure()
+    axes = figure.add_subplot()
+    for row, (split, errors) in enumerate(report.test_mse_per_mm2.items()):
+        colour = COLOURS[row]
+        axes.plot(errors, [row] * len(errors), "o", color=colour, alpha=0.6, ms=5)
+        median = sorted(errors)[len(errors) // 2]
+        axes.plot(median, row, "|", color=colour, ms=24, mew=2)
+        axes.text(median, row + 0.25, SPLIT_LABELS[split], ha="center", fontsize=8)
+    axes.axvline(published_per_mm2, color="0.3", ls="--", lw=1)
+    axes.text(published_per_mm2, -0.7, " published", fontsize=8, color="0.3")
+    axes.set(
+        xscale="log",
+        xlabel="test mean squared error of a (1/mm²), one dot a seed, bar: median",
+        yticks=[],
+        ylim=(-0.8, len(report.test_mse_per_mm2) - 0.3),
+        title="What was held out, and how well it was predicted",
+    )
+    axes.title.set_fontsize(9)
+    return figure

@@ -1,0 +1,246 @@
+"""Whole shapes of many designs at once: the planar kernels in parallel, on all cores.
+
+Designs are columns of arrays, in mm, MPa, mT and degrees; the kernel is dimensionless
+as `planar_march`. No weight and no clamp angle: this is for searching designs, not for
+comparing with one bench.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from ..core.errors import InputError
+from ..core.magnet import Magnet
+from ..core.units import MU0
+from .fields import FLUX_LIMIT_T
+from .magnet_field import magnet_block
+from .planar import (
+    GONE,
+    OK_STABLE,
+    OK_UNSTABLE,
+    STATE,
+    equilibrium,
+    shape,
+    sharpen,
+    touches,
+)
+from .planar_march import MAX_ORDER
+
+Array = NDArray[np.float64]
+
+STATUS = ("stable", "unstable", "pulled in: no equilibrium", "not solved")
+"""Meaning of the codes in `Shapes.status`."""
+
+ORDER = 10
+STEP = 0.6
+_FIELD = 17
+_ROWS_PER_CALL = 512
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Designs:
+    """Rods and fields, one a row: square sections, one remanence and side a rod.
+
+    Parameters
+    ----------
+    length_mm, E_MPa : ndarray, shape (n, sections)
+        Root first.
+    side_mm, remanence_mT : ndarray, shape (n,)
+    flux_mT : ndarray, shape (n,), or None
+        Uniform field; None before a magnet.
+    angle_deg : ndarray, shape (n,)
+        Direction of the uniform field; not used before a magnet.
+    magnet : Magnet or None
+    gap_mm : ndarray, shape (n,), or None
+        Gap of the magnet.
+
+    Raises
+    ------
+    InputError
+        If shapes disagree, a value is not finite, or a length, modulus, side or gap is
+        not above zero.
+    """
+
+    length_mm: Array
+    E_MPa: Array
+    side_mm: Array
+    remanence_mT: Array
+    flux_mT: Array | None = None
+    angle_deg: Array
+    magnet: Magnet | None = None
+    gap_mm: Array | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.side_mm)
+        if (self.flux_mT is None) == (self.magnet is None or self.gap_mm is None):
+            raise InputError("designs must have either flux_mT, or a magnet and gap_mm")
+        wide = ("length_mm", "E_MPa")
+        positive = (*wide, "side_mm", "gap_mm")
+        for name in (*positive, "remanence_mT", "flux_mT", "angle_deg"):
+            if (values := getattr(self, name)) is None:
+                continue
+            values = np.ascontiguousarray(values, dtype=np.float64)
+            if values.shape[:1] != (n,) or values.ndim != (2 if name in wide else 1):
+                raise InputError(
+                    f"designs: {name} must have {n} rows; "
+                    f"instead received shape {values.shape}"
+                )
+            if not np.all(np.isfinite(values)) or (
+                name in positive and np.any(values <= 0.0)
+            ):
+                what = "above zero" if name in positive else "finite"
+                raise InputError(f"designs: every {name} must be {what}")
+            object.__setattr__(self, name, values)
+        for name in ("flux_mT", "remanence_mT"):
+            values = getattr(self, name)
+            if values is not None and np.any(np.abs(values) > FLUX_LIMIT_T * 1e3):
+                raise InputError(f"designs: every {name} must be within 30 000 mT")
+
+    def __len__(self) -> int:
+        return len(self.side_mm)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shapes:
+    """What `solve_shapes` found.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, points, 5)
+        s, x, y in mm, theta in rad, kappa in 1/mm; NaN where there is no shape.
+    status : ndarray, shape (n,), int8
+        Index into `STATUS`.
+    error_mm : ndarray, shape (n,)
+        Bound of the numerical error of any point; NaN where there is no shape.
+    """
+
+    points: Array
+    status: NDArray[np.int8]
+    error_mm: Array
+
+
+def solve_shapes(designs: Designs, *, points: int = 61) -> Shapes:
+    """Solve every design and return its whole shape.
+
+    Parameters
+    ----------
+    designs : Designs
+    points : int
+        Equally spaced points from clamp to tip.
+
+    Notes
+    -----
+    Taylor order 10, corrected and bounded by order 14 (`planar.sharpen`), on all cores.
+    """
+    n, k = designs.length_mm.shape
+    total_mm = designs.length_mm.sum(axis=1)
+    side_m = designs.side_mm * 1e-3
+    EI = designs.E_MPa * 1e6 * side_m[:, None] ** 4 / 12.0
+    m = designs.remanence_mT * 1e-3 * side_m**2 / MU0
+    rods = np.zeros((n, k, 5))
+    rods[:, :, 0] = (designs.length_mm / total_mm[:, None])[:, ::-1]
+    rods[:, :, 1] = (EI[:, -1:] / EI)[:, ::-1]
+    rods[:, :, 2] = (m * (total_mm * 1e-3) ** 2 / EI[:, -1])[:, None]
+    margins = designs.side_mm / (2.0 * total_mm)
+    out = np.empty((n, points, 5))
+    status = np.empty(n, dtype=np.int8)
+    error = np.empty(n)
+    stations = np.linspace(0.0, 1.0, points)
+    fields = _fields(designs, total_mm)
+    in_threads(_solve, stations, rods, fields, total_mm, margins, out, status, error)
+    return Shapes(points=out, status=status, error_mm=error)
+
+
+def in_threads(kernel: Callable[..., None], shared: Array, *rows: NDArray) -> None:
+    """Call ``kernel(shared, *slices)`` on slices of rows, on all cores.
+
+    The kernel must release the interpreter (``nogil``). Threads rather than numba's
+    parallel layer: that one compiles four times as long, aborts on concurrent calls
+    where it falls back, and does not survive a fork.
+    """
+    n = len(rows[0])
+    starts = range(0, n, _ROWS_PER_CALL)
+
+    def call(start: int) -> None:
+        kernel(shared, *(array[start : start + _ROWS_PER_CALL] for array in rows))
+
+    if len(starts) <= 1:
+        for start in starts:
+            call(start)
+        return
+    with ThreadPoolExecutor(cores()) as pool:
+        for _ in pool.map(call, starts):
+            pass
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _fields(designs: Designs, total_mm: Array) -> Array:
+    fields = np.zeros((len(designs), _FIELD))
+    if designs.flux_mT is not None:
+        angle = np.radians(designs.angle_deg)
+        # Exact at the right angles, where rounding would make a straight rod bend.
+        fields[:, 1] = designs.flux_mT * 1e-3 * np.cos(angle)
+        fields[:, 2] = designs.flux_mT * 1e-3 * np.sin(angle)
+        fields[designs.angle_deg % 180.0 == 90.0, 1] = 0.0
+        fields[designs.angle_deg % 180.0 == 0.0, 2] = 0.0
+        return fields
+    if designs.magnet is None or designs.gap_mm is None:
+        raise InputError("designs must have either flux_mT, or a magnet and gap_mm")
+    fields[:, 0] = 1.0
+    block = magnet_block(designs.magnet, length_mm=0.0, gap_mm=0.0)
+    axis = np.array(designs.magnet.axes()[2])
+    fields[:, 1:] = block
+    fields[:, 4:7] -= designs.gap_mm[:, None] * axis
+    fields[:, 4] += total_mm
+    fields[:, 1:7] /= total_mm[:, None]
+    return fields
+
+
+@njit(cache=True, nogil=True)
+def _solve(stations, rods, fields, total, margins, out, status, error):  # type: ignore[no-untyped-def]
+    curve = np.empty((4, stations.shape[0]))
+    X = np.empty(STATE)
+    D = np.empty((STATE, 4))
+    T = np.empty((4, MAX_ORDER + 1))
+    C = np.empty((MAX_ORDER + 1, 4, 4))
+    u = np.empty(4)
+    for i in range(rods.shape[0]):
+        u[0] = u[2] = u[3] = 0.0
+        u[1] = 1.0
+        curve[0] = stations
+        curve[1] = 0.0
+        status[i] = 2
+        error[i] = math.nan
+        out[i] = math.nan
+        if touches(fields[i], curve[0], curve[1], margins[i]):
+            continue
+        outcome, _, _ = equilibrium(rods[i], fields[i], 0.0, u, ORDER, STEP, X, D, T, C)
+        if outcome > OK_UNSTABLE:
+            status[i] = 2 if outcome == GONE else 3
+            continue
+        wrong = sharpen(rods[i], fields[i], 0.0, u, ORDER, STEP, X, D, T, C)
+        shape(rods[i], fields[i], u, ORDER + 4, STEP, stations, X, D, T, C, curve)
+        if touches(fields[i], curve[0], curve[1], margins[i]):
+            continue
+        status[i] = 0 if outcome == OK_STABLE else 1
+        error[i] = wrong * total[i]
+        for j in range(stations.shape[0]):
+            out[i, j, 0] = stations[j] * total[i]
+            out[i, j, 1] = curve[0, j] * total[i]
+            out[i, j, 2] = curve[1, j] * total[i]
+            out[i, j, 3] = curve[2, j]
+            out[i, j, 4] = curve[3, j] / total[i]
