@@ -1,0 +1,282 @@
+"""Pixels to mm and back, and the fit of a camera to photographs of a board."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from magbend.core.errors import ConfigError, InputError, VisionError
+from magbend.vision.board import Board
+from magbend.vision.calibrate import calibrate, calibrate_known_length
+from magbend.vision.calibration import Calibration, scale_calibration, specimen_to_px
+from magbend.vision.measurement import Pose
+from magbend.vision.photo import Photo, as_photo, read_photo
+from magbend.vision.scene import render_board, scene_camera
+
+FIXTURES = Path(__file__).parents[2] / "fixtures" / "vision" / "rendered"
+BOARD = Board()
+
+
+def grid(size=(1600, 1200), border=60):
+    x = np.linspace(border, size[0] - border, 9)
+    y = np.linspace(border, size[1] - border, 7)
+    return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+
+
+def shape_error_um(measured_mm, true_mm):
+    """Largest distance after the best rigid motion: what bends a measured rod."""
+    a, b = measured_mm - measured_mm.mean(axis=0), true_mm - true_mm.mean(axis=0)
+    u, _, v = np.linalg.svd(a.T @ b)
+    return 1e3 * np.hypot(*(a @ (u @ v) - b).T).max()
+
+
+def board_photo(camera, seed=0, name="board.png", **kw) -> Photo:
+    picture = render_board(BOARD, camera, np.random.default_rng(seed), **kw)
+    return as_photo(picture, source=name)
+
+
+def lens_views(camera_options, tilts):
+    return [
+        board_photo(
+            scene_camera(**(camera_options | {"tilt_deg": tilt, "turn_deg": turn,
+                                              "tilt_direction_deg": direction})),
+            seed=i, name=f"lens{i}.png",
+        )
+        for i, (tilt, direction, turn) in enumerate(tilts)
+    ]  # fmt: skip
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    tilt=st.floats(0.0, 25.0), direction=st.floats(0.0, 360.0),
+    turn=st.floats(-180.0, 180.0), k1=st.floats(-0.3, 0.3), height=st.floats(-5, 20),
+)  # fmt: skip
+def test_to_px_undoes_to_mm(tilt, direction, turn, k1, height):
+    camera = scene_camera(
+        tilt_deg=tilt, tilt_direction_deg=direction, turn_deg=turn, focal_px=2500.0,
+        height_mm=150.0, distortion=(k1, 0.02, 1e-3, -1e-3, 0.0),
+    )  # fmt: skip
+    pixels = grid()
+    back = camera.to_px(camera.to_mm(pixels, height_mm=height), height_mm=height)
+    assert np.abs(back - pixels).max() < 1e-7
+
+
+def test_agrees_with_opencv_projection():
+    camera = scene_camera(
+        tilt_deg=7.0, turn_deg=20.0, distortion=(-0.2, 0.05, 1e-3, 2e-3, 0.01),
+        focal_px=1800.0, height_mm=90.0,
+    )  # fmt: skip
+    points = camera.to_mm(grid(), height_mm=2.0)
+    space = np.column_stack([points, np.full(len(points), 2.0)])
+    matrix = np.array(
+        [
+            [1800.0, 0.0, camera.centre_px[0]],
+            [0.0, 1800.0, camera.centre_px[1]],
+            [0, 0, 1],
+        ]
+    )
+    turn, _ = cv2.Rodrigues(camera.rotation)
+    theirs, _ = cv2.projectPoints(
+        space, turn, camera.translation_mm, matrix, np.array(camera.distortion)
+    )
+    ours = camera.to_px(points, height_mm=2.0)
+    np.testing.assert_allclose(ours, theirs.reshape(-1, 2), atol=1e-8)
+
+
+def test_frame_has_y_to_the_left_of_x_in_the_picture():
+    camera = scene_camera(turn_deg=37.0)
+    origin, along, left = camera.to_px(
+        np.array([[35.0, -25.0], [36.0, -25.0], [35.0, -24.0]])
+    )
+    (a, b), (c, d) = along - origin, left - origin
+    assert a * d - b * c < 0.0  # y runs down in pixels, so left is clockwise there
+
+
+def test_height_shrinks_the_scale_by_the_camera_distance():
+    camera = scene_camera(tilt_deg=0.0, height_mm=330.0)
+    low, high = (camera.mm_per_px((799.5, 599.5), height_mm=h) for h in (0.0, 3.3))
+    assert high / low == pytest.approx(0.99, abs=1e-9)
+
+
+def test_specimen_frame_lands_where_its_pose_says():
+    camera = scene_camera()
+    pose = Pose(x_mm=20.0, y_mm=-30.0, angle_deg=90.0, height_mm=0.9)
+    (pixel,) = specimen_to_px(camera, pose, np.array([[5.0, 2.0]]))
+    expected = camera.to_px(np.array([[18.0, -25.0]]), height_mm=0.9)[0]
+    np.testing.assert_allclose(pixel, expected, atol=1e-9)
+    points = np.array([[0.0, 0.0], [3.0, -4.0]])
+    np.testing.assert_allclose(
+        pose.from_board(pose.to_board(points)), points, atol=1e-12
+    )
+
+
+def test_saved_calibration_comes_back(tmp_path):
+    camera = scene_camera(distortion=(-0.1, 0.01, 1e-4, 2e-4, 0.0))
+    path = tmp_path / "calibration.json"
+    camera.save(path)
+    back = Calibration.load(path)
+    np.testing.assert_array_equal(back.to_mm(grid()), camera.to_mm(grid()))
+    flat = scale_calibration(mm_per_px=0.05, image_size_px=(100, 80))
+    flat.save(path)
+    assert Calibration.load(path).camera_height_sd_mm == np.inf
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda d: d.pop("focal_px"), "focal_px"),
+        (lambda d: d.update(focal=3), "focal"),
+        (lambda d: d.update(board_to_camera_rotation=[[1, 0, 0]] * 3), "rotation"),
+    ],
+)
+def test_damaged_calibration_is_refused_in_a_sentence(tmp_path, change, words):
+    path = tmp_path / "calibration.json"
+    scene_camera().save(path)
+    data = json.loads(path.read_text())
+    change(data)
+    path.write_text(json.dumps(data))
+    with pytest.raises(ConfigError, match=words):
+        Calibration.load(path)
+
+
+def test_missing_calibration_is_refused(tmp_path):
+    with pytest.raises(ConfigError, match="no such file"):
+        Calibration.load(tmp_path / "calibration.json")
+
+
+def test_photograph_of_another_size_is_refused():
+    with pytest.raises(VisionError, match="1600 x 1200"):
+        scene_camera().check_size(1200, 1600)
+
+
+def rendered_truth() -> tuple[Calibration, np.ndarray, np.ndarray]:
+    truth = json.loads((FIXTURES / "calib_D.json").read_text())
+    matrix = np.array(truth["K"])
+    u, _, v = np.linalg.svd(np.array(truth["R_world_to_cam"]))
+    camera = replace(
+        scene_camera(),
+        focal_px=(matrix[0, 0], matrix[1, 1]), centre_px=(matrix[0, 2], matrix[1, 2]),
+        rotation=u @ v, translation_mm=np.array(truth["t_world_to_cam_mm"]),
+    )  # fmt: skip
+    turn = np.array(truth["R_board_to_world"]) @ np.diag([1.0, -1.0, -1.0])
+    return camera, turn, np.array(truth["t_board_to_world_mm"])
+
+
+@pytest.mark.parametrize(("height", "limit_um"), [(0.0, 10.0), (0.9, 10.0)])
+def test_one_rendered_photograph_gives_the_plane(height, limit_um):
+    """Against the path tracer's own camera, over the whole picture."""
+    camera, turn, origin = rendered_truth()
+    found = calibrate(read_photo(FIXTURES / "calib_D.jpg"), board=BOARD)
+    world = camera.to_mm(grid(), height_mm=height)
+    space = np.column_stack([world, np.full(len(world), height)])
+    board = (space - origin) @ turn
+    np.testing.assert_allclose(board[:, 2], height, atol=1e-3)
+    measured = found.to_mm(grid(), height_mm=height)
+    assert np.hypot(*(measured - board[:, :2]).T).max() < 1e-3 * limit_um
+    assert found.rms_px < 0.08
+    # The truth lies within two of the standard deviations it claims.
+    assert abs(found.camera_height_mm - 329.87) < 2.0 * found.camera_height_sd_mm
+    assert found.camera_height_sd_mm < 0.25 * found.camera_height_mm
+
+
+def test_camera_height_given_by_hand_is_kept():
+    found = calibrate(
+        read_photo(FIXTURES / "calib_D.jpg"), board=BOARD, camera_height_mm=330.0
+    )
+    assert found.camera_height_mm == pytest.approx(330.0, rel=0.02)
+    assert found.camera_height_sd_mm < 0.025 * 330.0
+    assert found.camera_height_source == "given"
+
+
+LENS = {
+    "focal_px": 2400.0, "height_mm": 118.0, "size_px": (1600, 1200),
+    "distortion": (-0.18, 0.04, 4e-4, -3e-4, 0.0),
+}  # fmt: skip
+TILTS = [(25.0, d, t) for d, t in ((0, 0), (90, 5), (180, -5), (270, 10), (45, 90))]
+
+
+def test_lens_views_recover_a_barrel_lens():
+    truth = scene_camera(**LENS, tilt_deg=6.0)
+    found = calibrate(board_photo(truth), lens_views(LENS, TILTS), board=BOARD)
+    assert all(view.used for view in found.views)
+    assert found.focal_px[0] == pytest.approx(2400.0, rel=0.01)
+    assert found.distortion[0] == pytest.approx(-0.18, abs=0.02)
+    assert found.camera_height_mm == pytest.approx(truth.camera_height_mm, rel=0.01)
+    for height in (0.0, 5.0):
+        error = shape_error_um(
+            found.to_mm(grid(), height_mm=height), truth.to_mm(grid(), height_mm=height)
+        )
+        assert error < 40.0
+
+
+def test_a_bad_lens_view_is_dropped_and_named():
+    truth = scene_camera(**LENS, tilt_deg=6.0)
+    views = lens_views(LENS, TILTS)
+    bent = views[2].grey.copy()
+    bent[:, 800:] = np.roll(bent, 9, axis=0)[:, 800:]  # a board that is not flat
+    bad = replace(views[2], grey=bent, source="bent.png")
+    blank = Photo(grey=np.full((1200, 1600), 0.7, dtype=np.float32), source="blank.png")
+    small = Photo(grey=np.full((600, 800), 0.7, dtype=np.float32), source="small.png")
+    found = calibrate(
+        board_photo(truth), [*views[:2], bad, *views[3:], blank, small], board=BOARD
+    )
+    verdict = {view.name: view for view in found.views}
+    assert not verdict["bent.png"].used
+    assert "median" in verdict["bent.png"].why_not
+    assert "no board" in verdict["blank.png"].why_not
+    assert "800 x 600" in verdict["small.png"].why_not
+    assert found.focal_px[0] == pytest.approx(2400.0, rel=0.01)
+
+
+def test_one_view_says_how_little_it_knows_of_the_camera():
+    squarely = scene_camera(tilt_deg=0.0)
+    found = calibrate(board_photo(squarely), board=BOARD)
+    assert found.camera_height_sd_mm > 0.3 * found.camera_height_mm
+    assert "hardly" in found.camera_height_source
+    # The plane itself is good all the same.
+    assert shape_error_um(found.to_mm(grid()), squarely.to_mm(grid())) < 20.0
+
+
+def test_print_scale_scales_the_millimetres():
+    photo = read_photo(FIXTURES / "calib_D.jpg")
+    plain = calibrate(photo, board=BOARD)
+    scaled = calibrate(photo, board=replace(BOARD, print_scale=1.004))
+    point = (800.0, 600.0)
+    ratio = scaled.mm_per_px(point, height_mm=0.0) / plain.mm_per_px(
+        point, height_mm=0.0
+    )
+    assert ratio == pytest.approx(1.004, abs=1e-4)
+
+
+@pytest.mark.parametrize("level", [0.0, 1.0, 0.5])
+def test_photograph_without_a_board_is_refused(level):
+    photo = Photo(grey=np.full((400, 500), level, dtype=np.float32), source="x.png")
+    with pytest.raises(VisionError, match="no board"):
+        calibrate(photo, board=BOARD)
+
+
+def test_mirrored_board_is_refused():
+    photo = board_photo(scene_camera())
+    with pytest.raises(VisionError):
+        calibrate(
+            replace(photo, grey=np.ascontiguousarray(photo.grey[:, ::-1])), board=BOARD
+        )
+
+
+def test_known_length_gives_the_scale():
+    found = calibrate_known_length(
+        (1600, 1200), from_px=(100.0, 100.0), to_px=(400.0, 500.0), length_mm=25.0
+    )
+    points = found.to_mm(np.array([[100.0, 100.0], [400.0, 500.0]]), height_mm=3.0)
+    assert np.hypot(*np.diff(points, axis=0)[0]) == pytest.approx(25.0, rel=1e-8)
+    assert found.scale_relative_sd == pytest.approx(np.sqrt(2.0) / 500.0)
+    assert "no correction" in found.camera_height_source
+    with pytest.raises(InputError, match="at least 10 px"):
+        calibrate_known_length((99, 99), from_px=(1, 1), to_px=(2, 2), length_mm=25.0)

@@ -1,0 +1,387 @@
+"""Measure many photographs: both cores, one row each, resumable, whole files only."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import math
+import multiprocessing
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from ..core.errors import MagbendError, VisionError
+from ..core.files import write_bytes, write_text
+from ..core.progress import Progress, silent
+from . import tables
+from .calibration import Calibration
+from .extract import extract
+from .inputs import Source, digest, list_sources, read_source
+from .measurement import Measurement, failure
+from .overlay import overlay_png
+from .photo import Photo, read_photo
+
+_log = logging.getLogger(__name__)
+
+STATE_FILE = "extract.json"
+_CHECKPOINT_S = 20.0
+_CHUNK = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """How every photograph of a batch is measured; see `extract`.
+
+    Parameters
+    ----------
+    calibration : Calibration or None
+        None measures in pixels only.
+    rod_height_mm : float
+        Height of the rod's axis above the board's plane.
+    invert : bool or None
+        Light rod on dark ground; None looks for itself.
+    joints_mm : tuple of float
+        Arc lengths at which the stiffness jumps.
+    length_mm : float or None
+        Nominal length, to check against.
+    bare : Photo or None
+        The same scene without rod and clamp: its light is divided out.
+    """
+
+    calibration: Calibration | None = None
+    rod_height_mm: float = 0.0
+    invert: bool | None = None
+    joints_mm: tuple[float, ...] = ()
+    length_mm: float | None = None
+    bare: Photo | None = None
+
+    def fingerprint(self) -> str:
+        """Return a digest that changes with everything that changes a result."""
+        data: dict[str, Any] = {
+            "rod_height_mm": self.rod_height_mm,
+            "invert": self.invert,
+            "joints_mm": self.joints_mm,
+            "length_mm": self.length_mm,
+        }
+        if self.calibration is not None:
+            data["calibration"] = _plain(asdict(self.calibration))
+        if self.bare is not None:
+            data["bare"] = hashlib.sha256(self.bare.grey.tobytes()).hexdigest()
+        return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BatchResult:
+    """Where the tables are, and the row of every photograph in their order."""
+
+    out: Path
+    frames: tuple[tables.FrameRow, ...]
+
+    @property
+    def measured(self) -> int:
+        """How many photographs could be measured."""
+        return sum(frame.ok for frame in self.frames)
+
+
+@dataclass(frozen=True, slots=True)
+class _Done:
+    """The text that one photograph adds to the tables."""
+
+    image: str
+    sha256: str
+    frame: str
+    centreline: str
+    edges: str
+
+
+def measure(photo: Photo, settings: Settings) -> Measurement:
+    """Measure one photograph; a refusal is a value, never an exception.
+
+    Parameters
+    ----------
+    photo : Photo
+        The photograph.
+    settings : Settings
+        Calibration and options.
+    """
+    width, height = photo.size_px
+    if settings.calibration is not None:
+        try:
+            settings.calibration.check_size(width, height)
+        except VisionError as error:
+            return failure("calibration_mismatch", str(error))
+    if settings.bare is not None:
+        if settings.bare.size_px != photo.size_px:
+            return failure(
+                "bare_mismatch",
+                "the bare frame and the photograph differ in size: "
+                f"{settings.bare.size_px} and {photo.size_px} px",
+            )
+        photo = replace(photo, grey=_flattened(photo, settings.bare))
+    return extract(
+        photo,
+        settings.calibration,
+        rod_height_mm=settings.rod_height_mm,
+        invert=settings.invert,
+        joints_mm=settings.joints_mm,
+        length_mm=settings.length_mm,
+    )
+
+
+def extract_files(
+    paths: Sequence[Path],
+    out: Path,
+    *,
+    settings: Settings,
+    overlays: bool = True,
+    edges: Path | None = None,
+    workers: int = 1,
+    resume: bool = False,
+    progress: Progress = silent,
+) -> BatchResult:
+    """Measure photographs and write ``centrelines.csv``, ``frames.csv`` and overlays.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Pictures, folders, runs or videos (see `inputs.list_sources`).
+    out : Path
+        Folder for the results; it is made.
+    settings : Settings
+        Calibration and options.
+    overlays : bool
+        Whether to draw what was found.
+    edges : Path, optional
+        File for the side-edge points.
+    workers : int
+        Processes. More than one needs a script that starts under
+        ``if __name__ == "__main__":``, as everywhere in Python.
+    resume : bool
+        Keep what an earlier call with the same settings measured of unchanged files.
+    progress : callable
+        Called as ``progress(done, total)``.
+
+    Raises
+    ------
+    VisionError
+        If a path is missing, or nothing could be measured (the tables, which say why,
+        are written all the same).
+    """
+    sources = list_sources(paths)
+    out.mkdir(parents=True, exist_ok=True)
+    if overlays:
+        (out / "overlays").mkdir(exist_ok=True)
+    state = _State(out, edges, settings.fingerprint(), [s.image for s in sources])
+    if resume:
+        state.load(sources)
+    todo = [source for source in sources if source.image not in state.done]
+    task = _Task(settings, out / "overlays" if overlays else None, edges is not None)
+    progress(len(sources) - len(todo), len(sources))
+    for done in _run(task, todo, workers):
+        state.add(done)
+        progress(len(state.done), len(sources))
+    state.write()
+    frames = tuple(tables.read_frames(out / "frames.csv"))
+    if not any(frame.ok for frame in frames):
+        first = frames[0]
+        raise VisionError(
+            f"none of the {len(frames)} photographs could be measured; "
+            f"{first.image}: {first.reason.removeprefix(f'{first.image}: ')}"
+        )
+    return BatchResult(out=out, frames=frames)
+
+
+@dataclass(frozen=True, slots=True)
+class _Task:
+    settings: Settings
+    overlays: Path | None
+    edges: bool
+
+    def __call__(self, source: Source) -> _Done:
+        sha256 = ""
+        photo = None
+        try:
+            sha256 = digest(source)
+            photo = read_source(source)
+            measurement = measure(photo, self.settings)
+        except (MagbendError, OSError) as error:
+            measurement = failure("unreadable", str(error))
+        if self.overlays is not None and photo is not None:
+            write_bytes(self.overlays / source.overlay, overlay_png(photo, measurement))
+        return _Done(
+            source.image,
+            sha256,
+            tables.frame_row(source.image, measurement),
+            tables.centreline_rows(source.image, measurement),
+            tables.edge_rows(source.image, measurement, self.settings.calibration)
+            if self.edges
+            else "",
+        )
+
+
+_task: _Task | None = None
+
+
+def _start_worker(task: _Task) -> None:
+    global _task
+    _task = task
+    cv2.setNumThreads(1)
+
+
+def _work(source: Source) -> _Done:
+    if _task is None:
+        raise RuntimeError("the worker was not started")
+    return _task(source)
+
+
+def _run(task: _Task, todo: list[Source], workers: int) -> Iterator[_Done]:
+    """Yield results in the order of `todo`; finish alone if the workers die."""
+    finished = 0
+    if workers > 1 and len(todo) > 1:
+        pool = ProcessPoolExecutor(
+            min(workers, len(todo)),
+            mp_context=multiprocessing.get_context("spawn"),
+            initializer=_start_worker,
+            initargs=(task,),
+        )
+        try:
+            chunk = max(1, min(_CHUNK, len(todo) // workers))
+            for done in pool.map(_work, todo, chunksize=chunk):
+                finished += 1
+                yield done
+        except BrokenProcessPool:
+            _log.warning("a worker process died; going on in this one")
+        finally:
+            pool.shutdown(cancel_futures=True)
+    for source in todo[finished:]:
+        yield task(source)
+
+
+class _State:
+    """The tables so far; written whole from time to time, and at the end."""
+
+    def __init__(
+        self, out: Path, edges: Path | None, settings: str, order: list[str]
+    ) -> None:
+        self._out, self._edges, self._settings = out, edges, settings
+        self._order = order
+        self._next_write = time.monotonic() + _CHECKPOINT_S
+        self.done: dict[str, _Done] = {}
+
+    def add(self, done: _Done) -> None:
+        """Take a result; write a checkpoint if the last one is long ago."""
+        self.done[done.image] = done
+        now = time.monotonic()
+        if now > self._next_write:
+            self.write()
+            took = time.monotonic() - now
+            self._next_write = now + max(_CHECKPOINT_S, 20.0 * took)
+
+    def write(self) -> None:
+        """Write all tables; the state goes last and names only what they hold."""
+        ready = [self.done[image] for image in self._order if image in self.done]
+        write_text(
+            self._out / "centrelines.csv",
+            tables.header(tables.CENTRELINE_HEADER)
+            + "".join(done.centreline for done in ready),
+        )
+        write_text(
+            self._out / "frames.csv",
+            tables.header(tables.FRAME_HEADER) + "".join(done.frame for done in ready),
+        )
+        if self._edges is not None:
+            write_text(
+                self._edges,
+                tables.header(tables.EDGE_HEADER)
+                + "".join(done.edges for done in ready),
+            )
+        state = {
+            "schema": 1,
+            "settings_sha256": self._settings,
+            "edges": self._edges is not None,
+            "images": {done.image: done.sha256 for done in ready},
+        }
+        write_text(self._out / STATE_FILE, json.dumps(state, indent=1) + "\n")
+
+    def load(self, sources: list[Source]) -> None:
+        """Take over what an earlier call with the same settings has finished."""
+        try:
+            state = json.loads((self._out / STATE_FILE).read_text(encoding="utf-8"))
+            images = dict(state["images"])
+            if state["settings_sha256"] != self._settings:
+                return
+            if self._edges is not None and not state["edges"]:
+                return
+            frames = _lines_by_image(self._out / "frames.csv")
+            centrelines = _lines_by_image(self._out / "centrelines.csv")
+            edges = {} if self._edges is None else _lines_by_image(self._edges)
+        except (OSError, ValueError, KeyError, TypeError):
+            return
+        for source in sources:
+            name = source.image
+            if name in frames and source.path.exists():
+                sha256 = images.get(name)
+                if sha256 and sha256 == digest(source):
+                    self.done[name] = _Done(
+                        name, sha256, frames[name],
+                        centrelines.get(name, ""), edges.get(name, ""),
+                    )  # fmt: skip
+
+
+def _lines_by_image(path: Path) -> dict[str, str]:
+    """Return the lines of a table grouped by its first column."""
+    groups: dict[str, list[str]] = {}
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    for line in lines[1:]:
+        image = next(iter(_first_cell(line)), "")
+        groups.setdefault(image, []).append(line)
+    return {image: "".join(held) for image, held in groups.items()}
+
+
+def _first_cell(line: str) -> list[str]:
+    import csv
+
+    return next(csv.reader([line]), [])[:1]
+
+
+def _flattened(photo: Photo, bare: Photo) -> np.ndarray:
+    """Return the light of a photograph divided by that of the bare scene."""
+    smooth = cv2.GaussianBlur(bare.grey, (0, 0), 4.0)
+    typical = float(np.median(smooth))
+    return np.asarray(
+        photo.grey * (typical / np.maximum(smooth, 0.05 * typical)), dtype=np.float32
+    )
+
+
+def read_bare(path: Path) -> Photo:
+    """Read the photograph of the bare scene.
+
+    Raises
+    ------
+    VisionError
+        If it cannot be read or is dark.
+    """
+    photo = read_photo(path)
+    if float(np.median(photo.grey)) < 0.02:
+        raise VisionError(f"{path}: the bare frame must show lit paper; it is dark")
+    return photo
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return value
