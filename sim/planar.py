@@ -373,7 +373,8 @@ def solve_planar(rod, field, clamp, margin, s, order, step):  # type: ignore[no-
     -------
     tuple
         outcome, Morse index, load reached, error, Bx and By at the tip, root moment,
-        and the shape (4, n): x, y, theta, curvature.
+        the shape (4, n): x, y, theta, curvature, and the unknowns (gamma, x_L, y_L,
+        phi) of the march.
     """
     out = np.empty((4, s.shape[0]))
     X = np.empty(STATE)
@@ -385,14 +386,16 @@ def solve_planar(rod, field, clamp, margin, s, order, step):  # type: ignore[no-
     out[0] = s * math.cos(clamp)
     out[1] = s * math.sin(clamp)
     if touches(field, out[0], out[1], margin):
-        return TOUCHES, -1, 0.0, 0.0, 0.0, 0.0, 0.0, out
+        return TOUCHES, -1, 0.0, 0.0, 0.0, 0.0, 0.0, out, u
     outcome, index, load = equilibrium(rod, field, clamp, u, order, step, X, D, T, C)
     if outcome > OK_UNSTABLE:
         b = field_at(field, math.cos(clamp), math.sin(clamp))
-        return outcome, -1, load, 0.0, b[0], b[1], 0.0, out
+        return outcome, -1, load, 0.0, b[0], b[1], 0.0, out, u
     error = sharpen(rod, field, clamp, u, order, step, X, D, T, C)
     shape(rod, field, u, order + 4, step, s, X, D, T, C, out)
     if touches(field, out[0], out[1], margin):
         outcome = GONE
-    b = field_at(field, out[0, -1], out[1, -1])
-    return outcome, index, load, error + ROUNDING, b[0], b[1], -X[1], out
+    u[1] = out[0, -1]
+    u[2] = out[1, -1]
+    b = field_at(field, u[1], u[2])
+    return outcome, index, load, error + ROUNDING, b[0], b[1], -X[1], out, u

@@ -86,7 +86,7 @@ def solve(
     length_mm = specimen.length_mm
     margin = 0.5 * max(specimen.sides_mm) / length_mm
     s = stations(points)
-    outcome, index, load, error, bx, by, moment, table = solve_planar(
+    outcome, index, load, error, bx, by, moment, table, _ = solve_planar(
         rod,
         field_array(field, length_mm),
         rad_from_deg(support.clamp_angle_deg),

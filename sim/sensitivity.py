@@ -1,0 +1,491 @@
+"""Exact derivatives of the shape with respect to every parameter of the experiment.
+
+The unknowns u of the march satisfy R(u, p) = 0 at the clamp, so du/dp = -R_u^-1 R_p
+(implicit function theorem). R_p and what it does to the shape come from one more column
+of the same Taylor march per parameter: no differences, no step to choose.
+
+A parameter enters the kernel as the derivative of the rod array (n, 5), of the field
+and of the clamp angle. The field's is (bx, by, scale, cx, cy, omega): at a fixed point
+
+    dB = (bx, by) + scale B - G c + omega (J B - G J (r - centre))
+
+for a change of its value, a factor, a shift c of the magnet and a turn omega of it
+about its own centre, where G is the gradient and J turns by 90 degrees.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from ..core.checks import finite
+from ..core.errors import InputError, SolverError
+from ..core.specimen import Specimen
+from ..core.units import MU0, rad_from_deg
+from .fields import Field, MagnetField, Solution, Support, UniformField
+from .planar import ORDER, STEP, solve3, solve_planar
+from .planar_march import (
+    STATE,
+    WX,
+    WY,
+    E,
+    H,
+    M,
+    cross_joint,
+    enter_section,
+    field_at,
+    start,
+    substeps,
+    taylor_step,
+)
+from .scaling import (
+    checked_density,
+    field_array,
+    rod_array,
+    stations,
+    stiffness_Nmm2,
+)
+from .solve import NO_SUPPORT, solve
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sensitivities:
+    """Derivatives of a shape at fixed arc lengths from the clamp.
+
+    Parameters
+    ----------
+    solution : Solution
+        The equilibrium.
+    s_mm : ndarray, shape (n,)
+        Where.
+    parameters : tuple of str
+        With respect to what; the unit is the one in the name.
+    dx_mm, dy_mm, dtheta_rad : ndarray, shape (n, p)
+        Derivatives of x, y and the tangent angle, per unit of each parameter.
+    """
+
+    solution: Solution
+    s_mm: Array
+    parameters: tuple[str, ...]
+    dx_mm: Array
+    dy_mm: Array
+    dtheta_rad: Array
+
+
+@njit(cache=True)
+def _field_change(field, change, x, y, b):  # type: ignore[no-untyped-def]
+    """Return dB of one parameter at a fixed point (module docstring)."""
+    fx = change[0] + change[2] * b[0] - b[2] * change[3] - b[3] * change[4]
+    fy = change[1] + change[2] * b[1] - b[3] * change[3] - b[4] * change[4]
+    if change[5] != 0.0:
+        dx = x - field[4]
+        dy = y - field[5]
+        fx += change[5] * (-b[1] + b[2] * dy - b[3] * dx)
+        fy += change[5] * (b[0] + b[3] * dy - b[4] * dx)
+    return fx, fy
+
+
+@njit(cache=True)
+def _load_columns(field, m, dm, changes, x, y, cf, sf, D):  # type: ignore[no-untyped-def]
+    """Add to all columns the change of the load m B(r) of the point (x, y)."""
+    b = field_at(field, x, y)
+    for a in range(D.shape[1]):
+        dx = cf * D[2, a] - sf * D[3, a]
+        dy = sf * D[2, a] + cf * D[3, a]
+        fx = m * (b[2] * dx + b[3] * dy)
+        fy = m * (b[3] * dx + b[4] * dy)
+        if a >= 3:
+            bx, by = _field_change(field, changes[a - 3], x, y, b)
+            fx += m * bx + dm[a - 3] * b[0]
+            fy += m * by + dm[a - 3] * b[1]
+        D[4, a] += cf * fx + sf * fy
+        D[5, a] += cf * fy - sf * fx
+
+
+@njit(cache=True)
+def _end_section(rod, rods, i, X, D):  # type: ignore[no-untyped-def]
+    """Move the end of section `i`, for parameters that change its length."""
+    sine = math.sin(X[0])
+    cosine = math.cos(X[0])
+    for a in range(3, D.shape[1]):
+        dh = rods[a - 3, i, H]
+        D[0, a] += dh * X[6] * X[1]
+        D[1, a] += dh * (X[4] * sine - X[5] * cosine)
+        D[2, a] -= dh * cosine
+        D[3, a] -= dh * sine
+        D[4, a] += dh * X[7]
+        D[5, a] += dh * X[8]
+
+
+@njit(cache=True)
+def _station_columns(r, h, order, before, grow, T, C, out):  # type: ignore[no-untyped-def]
+    """Evaluate the columns at the fraction `r` of a step of length `h`.
+
+    `grow` holds, per parameter, how far the station slides along the section, as its
+    distance from the clamp is kept while lengths change.
+    """
+    theta_1 = sine = cosine = 0.0
+    order_1 = order - 1
+    for k in range(order_1, -1, -1):
+        theta_1 = theta_1 * r + (k + 1) * T[0, k + 1]
+        sine = sine * r + T[2, k]
+        cosine = cosine * r + T[3, k]
+    for a in range(C.shape[2]):
+        theta = x = y = 0.0
+        for k in range(order, 0, -1):
+            theta = theta * r + C[k, 0, a]
+            x = x * r + C[k - 1, 3, a] / k
+            y = y * r + C[k - 1, 2, a] / k
+        out[0, a] = theta * r + C[0, 0, a]
+        out[1, a] = before[0, a] - h * r * x
+        out[2, a] = before[1, a] - h * r * y
+        if a >= 3:
+            out[0, a] += grow[a - 3] * theta_1 / h
+            out[1, a] -= grow[a - 3] * cosine
+            out[2, a] -= grow[a - 3] * sine
+
+
+@njit(cache=True)
+def _combine(D, clamps, cf, sf, out):  # type: ignore[no-untyped-def]
+    """Close the columns at the clamp: subtract what the unknowns must make up for.
+
+    Return False if the Newton matrix is singular.
+    """
+    d = np.empty(3)
+    for a in range(3, D.shape[1]):
+        if not solve3(D, D[0, a] - clamps[a - 3], D[2, a], D[3, a], d):
+            return False
+        for k in range(out.shape[0]):
+            for i in range(3):
+                for j in range(3):
+                    out[k, i, a] += out[k, i, j] * d[j]
+            x = out[k, 1, a]
+            y = out[k, 2, a]
+            out[k, 1, a] = cf * x - sf * y
+            out[k, 2, a] = sf * x + cf * y
+    return True
+
+
+@njit(cache=True)
+def _columns(rod, field, u, rods, changes, clamps, s, order, step):  # type: ignore[no-untyped-def]
+    """Return theta, x, y by parameter at the stations, shape (n, 3, 3 + p), or fail.
+
+    The first three columns are work space.
+    """
+    count = 3 + rods.shape[0]
+    X = np.empty(STATE)
+    D = np.empty((STATE, count))
+    T = np.empty((4, order + 1))
+    C = np.empty((order + 1, 4, count))
+    out = np.empty((s.shape[0], 3, count))
+    grow = np.zeros(rods.shape[0])
+    for i in range(rod.shape[0]):
+        grow += rods[:, i, H]
+    start(rod, field, 1.0, u, 0, X, D)
+    cf = math.cos(u[3])
+    sf = math.sin(u[3])
+    D[0, 0] = 1.0
+    D[2, 1] = D[3, 2] = cf
+    D[3, 1] = -sf
+    D[2, 2] = sf
+    _load_columns(field, rod[0, M], rods[:, 0, M], changes, u[1], u[2], cf, sf, D)
+    k = s.shape[0] - 1
+    reached = 0.0
+    for i in range(rod.shape[0]):
+        enter_section(rod, i, 1.0, cf, sf, 0, X, D)
+        D[6, 3:] = rods[:, i, E]
+        D[7, 3:] = cf * rods[:, i, WX] + sf * rods[:, i, WY]
+        D[8, 3:] = cf * rods[:, i, WY] - sf * rods[:, i, WX]
+        n = substeps(rod[i, H], X, step)
+        h = rod[i, H] / n
+        for j in range(n):
+            before = D[2:4].copy()
+            taylor_step(h, order, X, D, count, T, C)
+            last = i + 1 == rod.shape[0] and j + 1 == n
+            while k >= 0 and (last or 1.0 - s[k] <= reached + h + 1e-13):
+                r = (1.0 - s[k] - reached) / h
+                _station_columns(r, h, order, before, grow, T, C, out[k])
+                k -= 1
+            reached += h
+        _end_section(rod, rods, i, X, D)
+        grow -= rods[:, i, H]
+        if i + 1 < rod.shape[0]:
+            x = u[1] + cf * X[2] - sf * X[3]
+            y = u[2] + sf * X[2] + cf * X[3]
+            m = rod[i + 1, M] - rod[i, M]
+            dm = rods[:, i + 1, M] - rods[:, i, M]
+            _load_columns(field, m, dm, changes, x, y, cf, sf, D)
+            cross_joint(rod, field, i, 1.0, u, cf, sf, 0, X, D)
+    return _combine(D, clamps, cf, sf, out), out
+
+
+def sensitivities(
+    specimen: Specimen,
+    field: Field,
+    *,
+    parameters: Sequence[str],
+    support: Support = NO_SUPPORT,
+    s_mm: ArrayLike | None = None,
+) -> Sensitivities:
+    """Return the derivatives of the equilibrium shape (plain rod, in the plane).
+
+    Parameters
+    ----------
+    specimen, field, support
+        As for `solve`.
+    parameters : sequence of str
+        Of ``E_MPa[i]``, ``length_mm[i]``, ``side_mm[i]``, ``remanence_mT[i]`` (section
+        i, 0 at the root), ``side_mm``, ``remanence_mT`` (all sections together),
+        ``flux_mT``, ``angle_deg``, ``gap_mm``, ``magnet.remanence_T``,
+        ``magnet.axis_angle_deg``, ``magnet.offset_mm[0|1|2]``, ``clamp_angle_deg``,
+        ``load_factor``, ``gravity_m_s2[0|1]``, ``density_kg_m3``.
+    s_mm : array_like, shape (n,), optional
+        Increasing arc lengths from the clamp; 61 equally spaced ones by default.
+
+    Returns
+    -------
+    Sensitivities
+        At arc lengths that stay fixed: where a length changes, the tip moves on from
+        s = L by its tangent besides. The undeformed tip, from which the gap counts,
+        moves with it.
+
+    Raises
+    ------
+    InputError
+        If a parameter is unknown or has no meaning for this field, an arc length lies
+        outside the rod, or the case is not planar.
+    SolverError
+        If there is no equilibrium, or it stands at a fold.
+    """
+    if not (support.in_plane and (isinstance(field, UniformField) or field.in_plane)):
+        raise InputError(
+            "gravity_m_s2[2] in m/s2, magnet elevation_deg and offset_mm[2] must be 0 "
+            "for sensitivities, which are planar; instead received one that is not"
+        )
+    solution = solve(specimen, field, support=support)
+    if solution.centreline is None:
+        raise SolverError(
+            f"{specimen.name!r} has no equilibrium at this load, so its shape has no "
+            f"derivatives; the branch ends at {solution.load_limit:.4g} of the load"
+        )
+    s = _stations(s_mm, specimen.length_mm)
+    rod = rod_array(specimen, support)
+    array = field_array(field, specimen.length_mm)
+    clamp = rad_from_deg(support.clamp_angle_deg)
+    u = solve_planar(rod, array, clamp, 0.0, stations(2), ORDER, STEP)[-1]
+    names = tuple(parameters)
+    records = [_record(name, specimen, field, support) for name in names]
+    count = len(names)
+    good, out = _columns(
+        rod,
+        array,
+        u,
+        np.array([r.rod for r in records]).reshape(count, *rod.shape),
+        np.array([r.field for r in records]).reshape(count, 6),
+        np.array([r.clamp for r in records]).reshape(count),
+        s / specimen.length_mm,
+        ORDER + 4,
+        STEP,
+    )
+    if not good or not np.all(np.isfinite(out)):
+        raise SolverError(
+            f"{specimen.name!r} stands at a fold of its equilibria: its shape has no "
+            "derivatives at this load"
+        )
+    return Sensitivities(
+        solution=solution,
+        s_mm=s,
+        parameters=names,
+        dx_mm=np.ascontiguousarray(out[:, 1, 3:]) * specimen.length_mm,
+        dy_mm=np.ascontiguousarray(out[:, 2, 3:]) * specimen.length_mm,
+        dtheta_rad=np.ascontiguousarray(out[:, 0, 3:]),
+    )
+
+
+def _stations(s_mm: ArrayLike | None, length_mm: float) -> Array:
+    if s_mm is None:
+        return stations(61) * length_mm
+    s = np.ascontiguousarray(s_mm, dtype=np.float64)
+    if (
+        s.ndim != 1
+        or len(s) == 0
+        or not np.all(np.isfinite(s))
+        or np.any(np.diff(s) < 0.0)
+        or s[0] < 0.0
+        or s[-1] > length_mm * (1.0 + 1e-12)
+    ):
+        raise InputError(
+            f"s_mm must be arc lengths from 0 to {length_mm:g} mm that do not fall; "
+            f"instead received an array of shape {s.shape}"
+        )
+    return s
+
+
+@dataclass(slots=True, kw_only=True)
+class _Record:
+    """Derivative of the kernel's input with respect to one parameter."""
+
+    rod: Array
+    field: Array
+    clamp: float = 0.0
+
+
+def _record(name: str, specimen: Specimen, field: Field, support: Support) -> _Record:
+    record = _Record(rod=np.zeros((len(specimen.sections), 5)), field=np.zeros(6))
+    match = re.fullmatch(r"([\w.]+?)(?:\[(\d+)\])?", name)
+    key = match.group(1) if match else name
+    index = int(match.group(2)) if match and match.group(2) is not None else None
+    if key in _OF_SECTIONS and (
+        index is not None or key in ("side_mm", "remanence_mT")
+    ):
+        chosen = range(len(specimen.sections)) if index is None else [index]
+        if index is not None and index >= len(specimen.sections):
+            raise InputError(
+                f"parameter {name} must name one of {len(specimen.sections)} sections, "
+                f"counted from 0 at the root; instead received {index}"
+            )
+        for i in chosen:
+            _OF_SECTIONS[key](record, i, specimen, field, support)
+    elif key == "clamp_angle_deg" and index is None:
+        record.clamp = rad_from_deg(1.0)
+    elif key in ("load_factor", "density_kg_m3", "gravity_m_s2"):
+        _of_loads(record, key, index, name, specimen, support)
+    else:
+        _of_field(record, key, index, name, specimen, field)
+    return record
+
+
+def _unit_rows(specimen: Specimen, support: Support) -> tuple[Array, Array]:
+    """Return m per mT of remanence (load factor 1) and weight per (kg/m3 m/s2)."""
+    length_mm = specimen.length_mm
+    per_N = length_mm**2 / stiffness_Nmm2(specimen)[0]
+    area = np.array(specimen.sides_mm)[::-1] ** 2
+    return area * 1e-9 / MU0 * per_N, area * length_mm * 1e-9 * per_N
+
+
+def _of_E(
+    record: _Record, i: int, specimen: Specimen, field: Field, support: Support
+) -> None:
+    rod = rod_array(specimen, support)
+    record.rod[-1 - i, E] -= rod[-1 - i, E] / specimen.sections[i].E_MPa
+
+
+def _of_side(
+    record: _Record, i: int, specimen: Specimen, field: Field, support: Support
+) -> None:
+    row = rod_array(specimen, support)[-1 - i]
+    powers = np.array([0.0, -4.0, 2.0, 2.0, 2.0])
+    record.rod[-1 - i] += powers * row / specimen.sides_mm[i]
+
+
+def _of_remanence(
+    record: _Record, i: int, specimen: Specimen, field: Field, support: Support
+) -> None:
+    per_mT, _ = _unit_rows(specimen, support)
+    record.rod[-1 - i, M] += support.load_factor * per_mT[-1 - i]
+
+
+def _of_length(
+    record: _Record, i: int, specimen: Specimen, field: Field, support: Support
+) -> None:
+    record.rod[-1 - i, H] += 1.0 / specimen.length_mm
+    if isinstance(field, MagnetField):
+        record.field[3] += 1.0 / specimen.length_mm
+
+
+_OF_ALL = ("side_mm", "remanence_mT")
+_OF_SECTIONS: dict[str, Callable[[_Record, int, Specimen, Field, Support], None]] = {
+    "E_MPa": _of_E,
+    "side_mm": _of_side,
+    "remanence_mT": _of_remanence,
+    "length_mm": _of_length,
+}
+
+
+def _of_loads(
+    record: _Record,
+    key: str,
+    index: int | None,
+    name: str,
+    specimen: Specimen,
+    support: Support,
+) -> None:
+    per_mT, per_weight = _unit_rows(specimen, support)
+    if key == "load_factor" and index is None:
+        record.rod[:, M] = per_mT * np.array(specimen.remanences_mT)[::-1]
+    elif key == "density_kg_m3" and index is None:
+        gx, gy, _ = support.gravity_m_s2
+        record.rod[:, WX] = per_weight * gx
+        record.rod[:, WY] = per_weight * gy
+    elif key == "gravity_m_s2" and index in (0, 1):
+        density = specimen.density_kg_m3 or checked_density(
+            specimen, Support(gravity_m_s2=(1.0, 0.0, 0.0))
+        )
+        record.rod[:, WX if index == 0 else WY] = per_weight * density
+    else:
+        raise _unknown(name)
+
+
+def _of_field(
+    record: _Record,
+    key: str,
+    index: int | None,
+    name: str,
+    specimen: Specimen,
+    field: Field,
+) -> None:
+    scale = 1.0 / specimen.length_mm
+    if isinstance(field, UniformField) and index is None:
+        unit = field_array(
+            UniformField(flux_mT=1.0, angle_deg=field.angle_deg), specimen.length_mm
+        )
+        if key == "flux_mT":
+            record.field[:2] = unit[1:3]
+            return
+        if key == "angle_deg":
+            turn = finite(field.flux_mT, "flux_mT", "mT") * rad_from_deg(1.0)
+            record.field[:2] = -unit[2] * turn, unit[1] * turn
+            return
+    if isinstance(field, MagnetField):
+        magnet = field.magnet
+        axis = np.array(magnet.axes()[2][:2])
+        if key == "gap_mm" and index is None:
+            record.field[3:5] = -axis * scale
+            return
+        if key == "magnet.remanence_T" and index is None:
+            if magnet.remanence_T == 0.0:
+                raise InputError(
+                    "magnet remanence_T must not be 0 T where its derivative is asked "
+                    "for; instead received 0"
+                )
+            record.field[2] = 1.0 / magnet.remanence_T
+            return
+        if key == "magnet.axis_angle_deg" and index is None:
+            turn = rad_from_deg(1.0)
+            distance = (field.gap_mm + magnet.sides_mm[2] / 2.0) * scale
+            record.field[3] = distance * axis[1] * turn
+            record.field[4] = -distance * axis[0] * turn
+            record.field[5] = turn
+            return
+        if key == "magnet.offset_mm" and index in (0, 1, 2):
+            # Across the plane the field is symmetric: the planar shape does not change.
+            if index < 2:
+                record.field[3 + index] = scale
+            return
+    raise _unknown(name)
+
+
+def _unknown(name: str) -> InputError:
+    return InputError(
+        f"parameter must be one that this case has, such as E_MPa[0], side_mm, "
+        f"clamp_angle_deg, flux_mT (uniform field) or gap_mm (magnet); instead "
+        f"received {name!r}"
+    )
