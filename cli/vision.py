@@ -13,6 +13,7 @@ from ..core.errors import InputError
 from .console import group, print_json, progress
 
 if TYPE_CHECKING:
+    from ..vision.batch import Settings
     from ..vision.board import Board
     from ..vision.calibration import Calibration
 
@@ -162,6 +163,14 @@ def extract(
     joints_mm: str = typer.Option(
         "", "--joints-mm", help="Where the stiffness jumps, such as 10,20."
     ),
+    free: bool = typer.Option(
+        False, "--free", help="Measure things without a clamp too, end to end."
+    ),
+    clamp_height_mm: float = typer.Option(
+        None, "--clamp-height-mm",
+        help="Height of the clamp's top above the board's plane; where it hides the "
+        "root (flag root_hidden).",
+    ),
     bare: Path = typer.Option(
         None, "--bare", help="The paper alone, to divide the light out."
     ),
@@ -192,7 +201,16 @@ def extract(
         calibration = own if own.exists() else None
     folder = out or run or Path("measured")
     settings = _settings(
-        calibration, rod_height_mm, invert, length_mm, _numbers(joints_mm), bare
+        calibration,
+        bare,
+        {
+            "rod_height_mm": rod_height_mm,
+            "length_mm": length_mm,
+            "clamp_height_mm": clamp_height_mm,
+        },
+        invert=invert,
+        joints_mm=_numbers(joints_mm),
+        clamp="none" if free else "auto",
     )
     with progress("photographs") as report:
         result = extract_files(
@@ -350,28 +368,27 @@ def _only_run(images: list[Path]) -> Path | None:
 
 def _settings(
     calibration: Path | None,
-    rod_height_mm: float | None,
-    invert: bool | None,
-    length_mm: float | None,
-    joints_mm: tuple[float, ...],
     bare: Path | None,
-) -> Any:
-    from ..core.checks import finite, positive
+    lengths: dict[str, float | None],
+    **others: Any,
+) -> Settings:
+    from ..core.checks import finite
     from ..vision.batch import Settings, read_bare
     from ..vision.calibration import Calibration
 
     known = None if calibration is None else Calibration.load(calibration)
-    if rod_height_mm is None:
-        rod_height_mm = 0.0 if known is None else known.rod_height_mm
+    given = {
+        name: finite(value, f"--{name.replace('_', '-')}", "mm")
+        for name, value in lengths.items()
+        if value is not None
+    }
+    if known is not None:
+        given.setdefault("rod_height_mm", known.rod_height_mm)
     return Settings(
         calibration=known,
-        rod_height_mm=finite(rod_height_mm, "--rod-height-mm", "mm"),
-        invert=invert,
-        joints_mm=joints_mm,
-        length_mm=None
-        if length_mm is None
-        else positive(length_mm, "--length-mm", "mm"),
         bare=None if bare is None else read_bare(bare),
+        **given,
+        **others,
     )
 
 

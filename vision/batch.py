@@ -13,7 +13,7 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -52,6 +52,10 @@ class Settings:
         Arc lengths at which the stiffness jumps.
     length_mm : float or None
         Nominal length, to check against.
+    clamp : {"auto", "none"}
+        ``none`` also measures rods that float freely.
+    clamp_height_mm : float or None
+        Height of the clamp's top above the board's plane.
     bare : Photo or None
         The same scene without rod and clamp: its light is divided out.
     """
@@ -61,6 +65,8 @@ class Settings:
     invert: bool | None = None
     joints_mm: tuple[float, ...] = ()
     length_mm: float | None = None
+    clamp: Literal["auto", "none"] = "auto"
+    clamp_height_mm: float | None = None
     bare: Photo | None = None
 
     def fingerprint(self) -> str:
@@ -70,6 +76,8 @@ class Settings:
             "invert": self.invert,
             "joints_mm": self.joints_mm,
             "length_mm": self.length_mm,
+            "clamp": self.clamp,
+            "clamp_height_mm": self.clamp_height_mm,
         }
         if self.calibration is not None:
             data["calibration"] = _plain(asdict(self.calibration))
@@ -133,6 +141,8 @@ def measure(photo: Photo, settings: Settings) -> Measurement:
         invert=settings.invert,
         joints_mm=settings.joints_mm,
         length_mm=settings.length_mm,
+        clamp=settings.clamp,
+        clamp_height_mm=settings.clamp_height_mm,
     )
 
 

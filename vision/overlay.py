@@ -122,11 +122,12 @@ def _caption(picture: NDArray[np.uint8], measurement: Measurement) -> None:
     size = max(0.35, picture.shape[1] / 2600)
     step = round(34 * size)
     room = max(10, int(picture.shape[1] / (19 * size)))
+    band = picture[: step * len(lines) + step // 2]
+    band[:] = (band.astype(np.uint16) + 3 * 255) // 4
     for row, line in enumerate(lines):
         text = line.encode("ascii", "replace").decode()[:room]
         at = (round(12 * size), step * (row + 1))
-        for colour, weight in (((255, 255, 255), 3), ((40, 40, 40), 1)):
-            cv2.putText(
-                picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, colour, weight,
-                cv2.LINE_AA,
-            )  # fmt: skip
+        cv2.putText(
+            picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, (40, 40, 40), 1,
+            cv2.LINE_AA,
+        )  # fmt: skip
