@@ -1,0 +1,172 @@
+"""Rod and clamp from paper: background, ratio, threshold, at a reduced scale.
+
+A single level over a whole frame (Otsu) splits the paper instead of finding the rod:
+the rod is half a percent of the picture and the light falls off by a quarter. So the
+light on the paper is fitted first (a quadric through the bright parts, dark things
+rejected) and the threshold is on the ratio to it. The mask only tells where to look:
+edges are measured later in the full picture.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+WORK_PX = 1000
+"""The longer side of the working picture, roughly."""
+
+_SAMPLE = 8000
+_LEAST_DARK = 30
+"""Fewer dark pixels than this in the working picture are no rod."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Binary:
+    """A reduced picture and its mask.
+
+    Parameters
+    ----------
+    ratio : ndarray, shape (h, w), float32
+        Light relative to the bare background, 1 on paper; inverted for light rods.
+    mask : ndarray, shape (h, w), uint8
+        1 on rod, clamp and everything else that is dark.
+    factor : int
+        Pixels of the photograph per pixel here.
+    inverted : bool
+        True for a light rod on a dark background.
+    dark, threshold : float
+        Ratio of the darkest things, and the level between.
+    """
+
+    ratio: NDArray[np.float32]
+    mask: NDArray[np.uint8]
+    factor: int
+    inverted: bool
+    dark: float
+    threshold: float
+
+
+def binarise(grey: NDArray[np.float32], *, invert: bool | None = None) -> Binary | None:
+    """Separate dark things from the paper (or light things from a dark board).
+
+    Parameters
+    ----------
+    grey : ndarray, shape (height, width), float32
+        Linear light.
+    invert : bool, optional
+        True for a light rod on a dark background; detected when not given: the
+        background is taken to be the larger part of the picture.
+
+    Returns
+    -------
+    Binary or None
+        None where nothing stands out from the background.
+    """
+    factor = max(1, round(max(grey.shape) / WORK_PX))
+    work = grey
+    if factor > 1:
+        size = (grey.shape[1] // factor, grey.shape[0] // factor)
+        whole = grey[: size[1] * factor, : size[0] * factor]
+        work = np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA))
+    sample = work[::3, ::3].ravel()
+    low, middle, high = np.quantile(sample, [0.003, 0.5, 0.997])
+    if high - low < 0.02 or high < 1.3 * low:
+        return None
+    if invert is None:
+        invert = bool(high - middle > middle - low)
+    if invert:
+        work = np.float32(max(high, float(sample.max()))) - work
+    ratio = work / background(work)
+    return _threshold(ratio, factor, invert)
+
+
+def rebinarise(binary: Binary, threshold: float) -> Binary:
+    """Return the same picture at another level."""
+    return Binary(
+        ratio=binary.ratio,
+        mask=_mask(binary.ratio, threshold),
+        factor=binary.factor,
+        inverted=binary.inverted,
+        dark=binary.dark,
+        threshold=threshold,
+    )
+
+
+def _threshold(ratio: NDArray[np.float32], factor: int, invert: bool) -> Binary | None:
+    sample = ratio[::2, ::2]
+    darker = sample[sample < 0.7]
+    if darker.size < _LEAST_DARK // 4:
+        return None
+    dark = float(np.quantile(darker, 0.1))
+    threshold = min(max(0.4 + 0.6 * dark, 0.35), 0.72)
+    return Binary(
+        ratio=ratio,
+        mask=_mask(ratio, threshold),
+        factor=factor,
+        inverted=invert,
+        dark=dark,
+        threshold=threshold,
+    )
+
+
+def _mask(ratio: NDArray[np.float32], threshold: float) -> NDArray[np.uint8]:
+    return np.asarray((ratio < threshold).view(np.uint8))
+
+
+def background(work: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Fit the light on the bare background: a quadric, dark things rejected.
+
+    Parameters
+    ----------
+    work : ndarray, shape (h, w), float32
+        Linear light.
+
+    Returns
+    -------
+    ndarray, shape (h, w), float32
+        Above zero everywhere.
+    """
+    height, width = work.shape
+    step = max(1, int((height * width / _SAMPLE) ** 0.5))
+    sample = work[::step, ::step]
+    rows = np.linspace(-1.0, 1.0, sample.shape[0])
+    columns = np.linspace(-1.0, 1.0, sample.shape[1])
+    basis = _quadric(rows, columns)
+    value = sample.astype(np.float64).ravel()
+    inside = value > np.quantile(value, 0.4)
+    fit = np.zeros_like(value)
+    for band in (0.25, 0.15, 0.1, 0.1):
+        design = basis[inside]
+        normal = design.T @ design + 1e-9 * np.eye(6)
+        coefficients = np.linalg.solve(normal, design.T @ value[inside])
+        fit = basis @ coefficients
+        level = np.maximum(fit, 1e-3)
+        inside = np.abs(value - fit) < band * level
+        if inside.sum() < 60:
+            coefficients = np.array([np.quantile(value, 0.7), 0, 0, 0, 0, 0])
+            break
+    smooth = _evaluate(coefficients, height, width)
+    floor = np.float32(max(0.2 * float(np.quantile(value, 0.6)), 1e-4))
+    return np.maximum(smooth, floor)
+
+
+def _quadric(
+    rows: NDArray[np.float64], columns: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    y, x = np.meshgrid(rows, columns, indexing="ij")
+    terms = (np.ones_like(x), x, y, x * x, x * y, y * y)
+    return np.stack([term.ravel() for term in terms], axis=1)
+
+
+def _evaluate(
+    coefficients: NDArray[np.float64], height: int, width: int
+) -> NDArray[np.float32]:
+    c = coefficients.astype(np.float32)
+    y = np.linspace(-1.0, 1.0, height, dtype=np.float32)[:, None]
+    x = np.linspace(-1.0, 1.0, width, dtype=np.float32)[None, :]
+    return np.asarray(
+        (c[0] + c[2] * y + c[5] * y * y) + (c[1] + c[4] * y + c[3] * x) * x
+    )

@@ -1,0 +1,139 @@
+"""Where the rod leaves the clamp, sub-pixel, for a clamp of any colour at any side.
+
+Two lines can be seen. (A) On the rod's own lanes the clamp's face begins where the dark
+of the rod ends: there if clamp and rod differ in grey value. (B) Beside the rod the
+front of the clamp meets the paper: there for a black clamp too. Neither lies at the
+height of the axis, so where the camera sees the clamp at an angle, each is shifted
+along the rod; `extract` corrects for that, knowing the camera.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .centreline_fit import Curve
+from .tip import STEP_PX, EndFace, crossing_of, lanes, line_through
+
+Array = NDArray[np.float64]
+Image = NDArray[np.float32]
+
+_LANES = 9
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClampLines:
+    """The two lines at a clamp, as far as they are seen.
+
+    Parameters
+    ----------
+    face : EndFace or None
+        (A) Where the rod's dark ends on its own lanes.
+    front : EndFace or None
+        (B) The clamp's front against the paper beside the rod.
+    """
+
+    face: EndFace | None
+    front: EndFace | None
+
+
+def find_clamp(
+    grey: Image,
+    curve: Curve,
+    *,
+    expected: float,
+    width: float,
+    blur: float,
+    contrast: float,
+    reach: float,
+    sign: float = 1.0,
+) -> ClampLines:
+    """Find the clamp's lines near an expected arc length (s falls into the clamp).
+
+    Parameters
+    ----------
+    grey : ndarray, shape (height, width), float32
+        Linear light.
+    curve : Curve
+        The axis, from about the clamp to the tip.
+    expected, reach : float
+        Where to look along s, and how far to either side, px.
+    width, blur : float
+        Width of the rod and standard deviation of the blur, px.
+    contrast : float
+        Light of paper minus light of rod.
+    sign : float
+        -1 for a light rod.
+
+    Returns
+    -------
+    ClampLines
+        Each None where it is not seen.
+    """
+    near = max(1.5, 2.2 * blur)
+    span = reach + near + 8.0
+    s = np.arange(expected - span, expected + span, STEP_PX)
+    return ClampLines(
+        face=_face(grey, curve, s, expected, width, near, contrast, reach, sign),
+        front=_front(grey, curve, s, expected, width, near, contrast, reach, sign),
+    )
+
+
+def _face(
+    grey: Image, curve: Curve, s: Array, expected: float, width: float, near: float,
+    contrast: float, reach: float, sign: float,
+) -> EndFace | None:  # fmt: skip
+    across = np.linspace(-0.3, 0.3, _LANES) * width
+    light = lanes(grey, curve, s, across, sign)[:, ::-1]
+    mean = np.nanmean(light, axis=0)
+    place = _steepest(mean, -s[::-1], -expected, reach, 0.12 * contrast)
+    if place is None:
+        return None
+    crossing = np.array(
+        [crossing_of(row, -s[::-1], place, near, 5.0, 3.0, reach=4.0) for row in light]
+    )
+    line = line_through(across, crossing)
+    return None if line is None else _turned(line)
+
+
+def _front(
+    grey: Image, curve: Curve, s: Array, expected: float, width: float, near: float,
+    contrast: float, reach: float, sign: float,
+) -> EndFace | None:  # fmt: skip
+    beside = np.linspace(0.5 * width + near + 3.0, 1.6 * width + near + 3.0, _LANES)
+    crossings, offsets = [], []
+    for across in (-beside[::-1], beside):
+        light = lanes(grey, curve, s, across, sign)
+        mean = np.nanmean(light, axis=0)
+        place = _steepest(mean, s, expected, reach, 0.15 * contrast)
+        if place is None:
+            continue
+        crossings.extend(
+            crossing_of(row, s, place, near, 5.0, 3.0, reach=4.0) for row in light
+        )
+        offsets.extend(across)
+    if len(offsets) < _LANES:
+        return None
+    return line_through(np.array(offsets), np.array(crossings))
+
+
+def _steepest(
+    profile: Array, s: Array, expected: float, reach: float, least: float
+) -> float | None:
+    """Return where a profile rises most over 3 px, if by at least `least`."""
+    lag = round(3.0 / STEP_PX)
+    rise = profile[lag:] - profile[:-lag]
+    centre = 0.5 * (s[lag:] + s[:-lag])
+    rise = np.where(np.abs(centre - expected) <= reach, rise, -np.inf)
+    rise[~np.isfinite(rise)] = -np.inf
+    best = int(np.argmax(rise))
+    return float(centre[best]) if rise[best] > least else None
+
+
+def _turned(line: EndFace) -> EndFace:
+    return EndFace(
+        s=-line.s, sigma=line.sigma, skew=-line.skew, scatter=line.scatter,
+        found=line.found,
+    )  # fmt: skip

@@ -1,0 +1,187 @@
+"""One photograph to one measurement: find, refine, judge, and turn pixels into mm."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.errors import MagbendError
+from .binarise import Binary, binarise, rebinarise
+from .calibration import Calibration
+from .centreline_fit import Curve
+from .measurement import Measurement, failure
+from .photo import Photo
+from .quality import doubts, refusal
+from .refine import LostError, Refined, refine
+from .rod import Candidate, find_candidates
+from .specimen_frame import Setting, measurement
+from .track import start_curve
+
+Array = NDArray[np.float64]
+Clamp = Literal["auto", "none"]
+
+LEAST_LENGTH = 0.08
+"""Shortest rod, in diagonals of the picture: below that it is dust, hair or print."""
+
+
+def extract(
+    photo: Photo,
+    calibration: Calibration | None,
+    *,
+    rod_height_mm: float | None = None,
+    invert: bool | None = None,
+    joints_mm: Sequence[float] = (),
+    length_mm: float | None = None,
+    clamp: Clamp = "auto",
+    clamp_height_mm: float | None = None,
+) -> Measurement:
+    """Measure the rod in a photograph, from clamp to tip.
+
+    Parameters
+    ----------
+    photo : Photo
+        The photograph, in linear light.
+    calibration : Calibration or None
+        The camera; without it only pixels are given, flagged ``uncalibrated``.
+    rod_height_mm : float, optional
+        Height of the rod's axis above the board's plane; else the calibration's.
+    invert : bool, optional
+        True for a light rod on a dark background; detected when not given.
+    joints_mm : sequence of float
+        Arc lengths of stiffness joints, where the curvature may jump.
+    length_mm : float, optional
+        Nominal free length; a measured length 2 % off is flagged ``length_mismatch``.
+    clamp : {"auto", "none"}
+        ``none`` also measures a rod that floats freely, from one end to the other.
+    clamp_height_mm : float, optional
+        Height of the clamp's top above the board's plane. Needed only where the camera
+        looks over the clamp so that it hides the root (flag ``root_hidden``).
+
+    Returns
+    -------
+    Measurement
+        Failed, with flag and reason, where there is nothing to vouch for; never raises
+        for what a picture shows.
+    """
+    setting = Setting(
+        calibration=calibration,
+        rod_height_mm=_height(calibration, rod_height_mm),
+        joints_mm=tuple(joints_mm),
+        length_mm=length_mm,
+        clamp_height_mm=clamp_height_mm,
+    )
+    try:
+        if calibration is not None:
+            calibration.check_size(*photo.size_px)
+        return _extract(photo, setting, invert, clamp)
+    except LostError as lost:
+        return failure(lost.flag, lost.reason)
+    except MagbendError as error:
+        return failure("calibration_mismatch", str(error))
+    except (np.linalg.LinAlgError, FloatingPointError, ValueError, IndexError) as error:
+        return failure("not_measurable", f"the picture cannot be measured ({error})")
+
+
+def _height(calibration: Calibration | None, given: float | None) -> float:
+    if given is not None:
+        return given
+    return 0.0 if calibration is None else calibration.rod_height_mm
+
+
+def _extract(
+    photo: Photo, setting: Setting, invert: bool | None, clamp: Clamp
+) -> Measurement:
+    binary = binarise(photo.grey, invert=invert)
+    if binary is None:
+        return _empty(photo)
+    candidate = _choose(binary, clamp)
+    sign = -1.0 if binary.inverted else 1.0
+    start = start_curve(
+        photo.grey, candidate.points_px, candidate.width_px, sign=sign,
+        follow=candidate.root == "clamp",
+    )  # fmt: skip
+    if start is None:
+        raise LostError("edges_lost", "the rod has no two edges against the paper")
+
+    def joints(curve: Curve) -> Sequence[float]:
+        return setting.joints_px(curve)
+
+    refined = refine(photo.grey, start, root=candidate.root, sign=sign, joints=joints)
+    refusal(photo, refined, candidate)
+    result = measurement(refined, candidate, setting)
+    return doubts(result, photo, refined, candidate, setting)
+
+
+def _empty(photo: Photo) -> Measurement:
+    if photo.clipped > 0.5:
+        return failure("overexposed", "the picture is white all over; expose it less")
+    if float(photo.grey.max()) < 0.02:
+        return failure("underexposed", "the picture is black all over; expose it more")
+    return failure("no_rod", "nothing stands out from the background")
+
+
+def _choose(binary: Binary, clamp: Clamp) -> Candidate:
+    """Return the rod; a paler clamp shows only at higher levels."""
+    best: Candidate | None = None
+    least = LEAST_LENGTH * binary.factor * float(np.hypot(*binary.mask.shape))
+    for level in _levels(binary):
+        at_level = binary if level == binary.threshold else rebinarise(binary, level)
+        rods = [item for item in find_candidates(at_level) if item.length_px > least]
+        if not rods:
+            continue
+        rod = rods[0]
+        _refuse_second(rods)
+        if rod.root != "free":
+            return _accept(rod)
+        best = best or rod
+    if best is None:
+        raise LostError("no_rod", "nothing in the picture is long and thin like a rod")
+    if clamp == "none":
+        return best
+    raise LostError(
+        "no_clamp",
+        "the rod grows from no clamp and from no border of the picture; "
+        "for a rod that floats freely say so with clamp none",
+    )
+
+
+def _levels(binary: Binary) -> list[float]:
+    """Return the levels to try: a pale rod on a board is best told from the board."""
+    first = binary.threshold
+    higher = [level for level in (0.6, 0.75) if level > first + 0.05]
+    return [*higher, first] if binary.inverted else [first, *higher]
+
+
+def _refuse_second(rods: list[Candidate]) -> None:
+    first = rods[0]
+    alike = [
+        other
+        for other in rods[1:]
+        if 0.5 < other.width_px / first.width_px < 2.0
+        and other.length_px > 0.4 * first.length_px
+    ]
+    if len(alike) == 1:
+        raise LostError(
+            "two_rods",
+            "there are two things like a rod in the picture; cover one of them",
+        )
+    if alike:
+        raise LostError(
+            "no_rod",
+            f"there are {len(alike) + 1} long and thin things in the picture and none "
+            "that stands out as the rod",
+        )
+
+
+def _accept(rod: Candidate) -> Candidate:
+    if rod.contacts > 1:
+        flag = "touches_border" if rod.root == "border" else "touches_object"
+        what = "the border of the picture" if rod.root == "border" else "another object"
+        raise LostError(flag, f"the rod touches {what} besides its root")
+    return rod
+
+
+__all__ = ["Refined", "extract"]

@@ -1,0 +1,78 @@
+"""Gates: every doubt is a named flag, and what cannot be vouched for is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .measurement import Measurement
+from .photo import Photo
+from .refine import LostError, Refined
+from .rod import Candidate
+from .specimen_frame import Setting
+
+LENGTH_TOLERANCE = 0.02
+
+
+def refusal(photo: Photo, refined: Refined, candidate: Candidate) -> None:
+    """Refuse a refined rod that contradicts what was found at first.
+
+    Raises
+    ------
+    LostError
+        With flag and reason.
+    """
+    length = float(refined.fit.curve.s[-1])
+    width = float(np.median(refined.width[refined.good]))
+    if not 0.8 < length / candidate.length_px < 1.5 + 8.0 * width / length:
+        raise LostError(
+            "inconsistent",
+            f"the measured axis is {length:.0f} px long, but the dark thing it belongs "
+            f"to {candidate.length_px:.0f} px",
+        )
+    if refined.good.mean() < 0.6:
+        raise LostError(
+            "edges_lost",
+            f"only {100 * refined.good.mean():.0f} % of the rod has two clear edges",
+        )
+    if refined.fit.noise > 0.25 * width:
+        raise LostError("inconsistent", "the edges of the rod lie on no smooth curve")
+    if length < 5.0 * width:
+        raise LostError("no_rod", "what looks like a rod is shorter than five widths")
+
+
+def doubts(
+    result: Measurement,
+    photo: Photo,
+    refined: Refined,
+    candidate: Candidate,
+    setting: Setting,
+) -> Measurement:
+    """Return the measurement with its flags."""
+    flags: list[str] = []
+    if setting.calibration is None:
+        flags.append("uncalibrated")
+    if candidate.root == "border":
+        flags.append("clamp_at_border")
+    if candidate.root == "free":
+        flags.append("no_clamp")
+    if photo.clipped > 0.01:
+        flags.append("overexposed")
+    if _shadow(refined) > 0.02:
+        flags.append("shadow")
+    if refined.tip.scatter > 0.5 or abs(refined.tip.skew) > 0.2:
+        flags.append("ragged_tip")
+    length = result.length_mm
+    nominal = setting.length_mm
+    if nominal is not None and abs(length / nominal - 1.0) > LENGTH_TOLERANCE:
+        flags.append("length_mismatch")
+    return replace(result, flags=tuple(flags))
+
+
+def _shadow(refined: Refined) -> float:
+    """Return how much the paper's level rises per px beside the edges, relative."""
+    edges = refined.edges
+    good = refined.good
+    shade = np.abs(edges.shade_low - edges.shade_high)[good]
+    return float(np.nanquantile(shade, 0.9)) / max(refined.contrast, 1e-6)

@@ -1,0 +1,295 @@
+"""Edge passes: edges, ends and curve in turn, until nothing moves any more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .centreline_fit import Curve, CurveFit, fit_curve
+from .clamp import ClampLines, find_clamp
+from .edges import Edges, find_edges
+from .rod import Root
+from .tip import EndFace, find_tip
+from .track import Start
+
+Array = NDArray[np.float64]
+Image = NDArray[np.float32]
+
+_PASSES = 4
+
+
+class LostError(Exception):
+    """The edges or an end of the rod got lost; private to this package.
+
+    Parameters
+    ----------
+    flag, reason : str
+        As in `Measurement`.
+    """
+
+    def __init__(self, flag: str, reason: str) -> None:
+        super().__init__(reason)
+        self.flag = flag
+        self.reason = reason
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Refined:
+    """A rod measured in pixels.
+
+    Parameters
+    ----------
+    fit : CurveFit
+        The axis from where the clamp line was taken (s = 0) to the tip's face.
+    edges : Edges
+        Side edges at the stations of the fit.
+    good : ndarray of bool, shape (n,)
+        Stations whose edges were used.
+    width : ndarray, shape (n,)
+        Smoothed width.
+    sigma_width : ndarray, shape (n,)
+        Its standard deviation.
+    tip : EndFace
+        The free end; s counts as in `fit`.
+    clamp : ClampLines or None
+        Lines at the clamp; None for a rod that enters at the border or floats.
+    blur, contrast : float
+        Blur in px and paper minus rod in linear light.
+    """
+
+    fit: CurveFit
+    edges: Edges
+    good: NDArray[np.bool_]
+    width: Array
+    sigma_width: Array
+    tip: EndFace
+    clamp: ClampLines | None
+    blur: float
+    contrast: float
+
+
+@dataclass(slots=True)
+class _State:
+    curve: Curve
+    low: Array
+    high: Array
+    width: float
+    blur: float
+    first: float
+    last: float
+
+
+def refine(
+    grey: Image,
+    start: Start,
+    *,
+    root: Root,
+    sign: float,
+    joints: Callable[[Curve], Sequence[float]] = lambda _curve: (),
+) -> Refined:
+    """Measure axis, edges and ends.
+
+    Parameters
+    ----------
+    grey : ndarray, shape (height, width), float32
+        Linear light.
+    start : Start
+        Curve within a pixel or two of the axis.
+    root : {"clamp", "border", "free"}
+        What the rod grows from.
+    sign : float
+        -1 for a light rod.
+    joints : callable
+        Arc lengths in px, from the root, of joints on a given curve.
+
+    Raises
+    ------
+    LostError
+        If edges or ends cannot be found.
+    """
+    half = np.full(len(start.curve.s), 0.5 * start.width)
+    state = _State(start.curve, -half, half, start.width, 1.0, 0.0, start.curve.s[-1])
+    result = None
+    for turn in range(_PASSES):
+        result = _pass(grey, state, root, sign, joints, turn)
+    if result is None:
+        raise LostError("no_rod", "nothing was measured")
+    return result
+
+
+def _pass(
+    grey: Image, state: _State, root: Root, sign: float,
+    joints: Callable[[Curve], Sequence[float]], turn: int,
+) -> Refined:  # fmt: skip
+    curve, width = state.curve, state.width
+    reach = min(0.35 * width, 6.0 + 0.1 * width)
+    if turn:
+        reach = min(max(3.0, 3.0 * state.blur), 0.45 * width)
+    edges = find_edges(
+        grey, curve.points, curve.normals, state.low, state.high,
+        reach=reach, blur=state.blur, sign=sign,
+    )  # fmt: skip
+    good = _usable(edges)
+    if good.sum() < max(8.0, 0.4 * len(good)):
+        raise LostError(
+            "edges_lost",
+            "less than half of the rod has two edges that can be told from the paper",
+        )
+    state.width = float(np.median(edges.width[good]))
+    blur = edges.blur
+    state.blur = float(np.clip(blur, 0.3, 0.5 * state.width)) if blur > 0 else 1.0
+    tip, lines, first = _ends(grey, state, edges, good, root, sign, turn)
+    fit, used = _fit(state, edges, good, first, tip.s, joints, turn)
+    shift = replace(tip, s=tip.s - first)
+    at = fit.curve.s + first
+    smooth, sigma = _smooth_width(curve.s, edges, good, at, state.width)
+    state.curve, state.first, state.last = fit.curve, 0.0, float(fit.curve.s[-1])
+    state.low, state.high = -0.5 * smooth, 0.5 * smooth
+    kept = _at_stations(edges, curve.s, at)
+    return Refined(
+        fit=fit, edges=kept, good=used, width=smooth, sigma_width=sigma, tip=shift,
+        clamp=None if lines is None else _shifted(lines, first),
+        blur=state.blur, contrast=edges.contrast,
+    )  # fmt: skip
+
+
+def _usable(edges: Edges) -> NDArray[np.bool_]:
+    """Stations with both edges, of a width like their neighbours'."""
+    width = edges.width
+    found = np.isfinite(width)
+    if found.sum() < 8:
+        return found
+    centre = float(np.median(width[found]))
+    spread = 1.4826 * float(np.median(np.abs(width[found] - centre)))
+    return found & (np.abs(width - centre) < max(5.0 * spread, 0.6))
+
+
+def _ends(
+    grey: Image, state: _State, edges: Edges, good: NDArray[np.bool_],
+    root: Root, sign: float, turn: int,
+) -> tuple[EndFace, ClampLines | None, float]:  # fmt: skip
+    curve, width = state.curve, state.width
+    outwards = 0.4 * width if turn == 0 else 0.0
+    reach = 1.3 * width if turn == 0 else 0.3 * width + 2.0
+    near = good & (curve.s > curve.s[-1] - 3.0 * width)
+    middle = float(np.median(edges.middle[near])) if near.any() and turn == 0 else 0.0
+    tip = find_tip(
+        grey, curve, expected=state.last + outwards, width=width, blur=state.blur,
+        reach=reach, middle=middle, sign=sign,
+    )  # fmt: skip
+    if tip is None:
+        raise LostError("no_tip", "the free end of the rod has no edge")
+    if root == "border":
+        return tip, None, _border_crossing(grey, curve)
+    if root == "free":
+        return tip, None, _other_end(grey, state, sign, outwards, reach)
+    lines = find_clamp(
+        grey, curve, expected=state.first - (0.25 * width if turn == 0 else 0.0),
+        width=width, blur=state.blur, contrast=edges.contrast,
+        reach=1.3 * width if turn == 0 else 0.3 * width + 3.0, sign=sign,
+    )  # fmt: skip
+    line = lines.face or lines.front
+    if line is None:
+        raise LostError("no_clamp", "it is not seen where the rod leaves the clamp")
+    return tip, lines, line.s
+
+
+def _other_end(
+    grey: Image, state: _State, sign: float, outwards: float, reach: float
+) -> float:
+    curve = state.curve
+    back = Curve(
+        s=-curve.s[::-1], points=curve.points[::-1], theta=curve.theta[::-1] + np.pi,
+        kappa=-curve.kappa[::-1],
+    )  # fmt: skip
+    end = find_tip(
+        grey, back, expected=outwards - state.first, width=state.width,
+        blur=state.blur, reach=reach, sign=sign,
+    )  # fmt: skip
+    if end is None:
+        raise LostError("no_tip", "an end of the rod has no edge")
+    return -end.s
+
+
+def _border_crossing(grey: Image, curve: Curve) -> float:
+    """Return the arc length at which the axis enters the picture."""
+    s = np.arange(-80.0, min(80.0, curve.s[-1]), 0.25)
+    points, _ = curve.at(s)
+    height, width = grey.shape
+    inside = (
+        (points[:, 0] >= 0.0) & (points[:, 0] <= width - 1.0)
+        & (points[:, 1] >= 0.0) & (points[:, 1] <= height - 1.0)
+    )  # fmt: skip
+    outside = np.flatnonzero(~inside)
+    return (
+        float(s[outside[-1] + 1]) if outside.size and outside[-1] + 1 < len(s) else 0.0
+    )
+
+
+def _fit(
+    state: _State, edges: Edges, good: NDArray[np.bool_], first: float, last: float,
+    joints: Callable[[Curve], Sequence[float]], turn: int,
+) -> tuple[CurveFit, NDArray[np.bool_]]:  # fmt: skip
+    curve, width = state.curve, state.width
+    if last - first < 4.0 * width:
+        raise LostError("no_rod", "what looks like a rod is shorter than four widths")
+    count = max(round(last - first), 16)
+    s = np.linspace(first, last, count + 1)
+    points, theta = curve.at(s)
+    offset = np.interp(s, curve.s[good], edges.middle[good])
+    share = np.interp(s, curve.s, good.astype(np.float64), left=0.0, right=0.0)
+    clear = max(2.0, 2.5 * state.blur)
+    used = (share > 0.99) & (s > first + clear) & (s < last - clear)
+    if used.sum() < 8:
+        raise LostError("edges_lost", "too few edges of the rod are seen")
+    measured = points + offset[:, None] * np.column_stack(
+        [-np.sin(theta), np.cos(theta)]
+    )
+    weights = used.astype(np.float64)
+    options = {"spacing": max(width, (last - first) / 60.0), "joints": joints(curve)}
+    fit = fit_curve(s - first, measured, weights, theta=theta, **options)  # type: ignore[arg-type]
+    if turn >= 1:
+        outlying = np.abs(np.nan_to_num(fit.residual)) > 4.0 * fit.noise + 1e-3
+        if outlying.any() and (used & ~outlying).sum() > 0.5 * used.sum():
+            used = used & ~outlying
+            weights = used.astype(np.float64)
+            fit = fit_curve(s - first, measured, weights, theta=theta, **options)  # type: ignore[arg-type]
+    return fit, used
+
+
+def _smooth_width(
+    s: Array, edges: Edges, good: NDArray[np.bool_], at: Array, typical: float
+) -> tuple[Array, Array]:
+    """Return the width as a running mean over one rod width, and its deviation."""
+    value = np.where(good, edges.width, 0.0)
+    half = max(2, int(0.5 * typical))
+    window = np.ones(2 * half + 1)
+    total = np.convolve(value, window, mode="full")[half:-half]
+    count = np.convolve(good.astype(np.float64), window, mode="full")[half:-half]
+    known = count >= 0.3 * len(window)
+    mean = np.interp(s, s[known], total[known] / count[known])
+    rest = np.where(good, edges.width - mean, np.nan)
+    scatter = 1.4826 * float(np.nanmedian(np.abs(rest)))
+    sigma = scatter * np.sqrt(2.0 / np.maximum(count, 1.0))
+    return np.interp(at, s, mean), np.interp(at, s, sigma)
+
+
+def _at_stations(edges: Edges, s: Array, at: Array) -> Edges:
+    values = {}
+    for name in Edges.__slots__:
+        values[name] = np.interp(at, s, getattr(edges, name), left=np.nan, right=np.nan)
+    return Edges(**values)
+
+
+def _shifted(lines: ClampLines, first: float) -> ClampLines:
+    return ClampLines(
+        face=None
+        if lines.face is None
+        else replace(lines.face, s=lines.face.s - first),
+        front=None
+        if lines.front is None
+        else replace(lines.front, s=lines.front.s - first),
+    )

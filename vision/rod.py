@@ -1,0 +1,322 @@
+"""Find the rod among dark things: a long thin one that grows from a fat one.
+
+The clamp may be as black as the rod, so shape tells them apart, not grey value: what
+survives an opening with a disc wider than the rod is clamp (or magnet), what it removes
+and is long for its width is rod. A geodesic distance from the root orders the
+rod's pixels, and the centres of its level sets are the start curve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import cv2
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from .binarise import Binary
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.uint8]
+Root = Literal["clamp", "border", "free"]
+
+LEAST_SLENDERNESS = 6.0
+"""Shortest rod, in widths."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Candidate:
+    """Something long and thin, in pixels of the photograph.
+
+    Parameters
+    ----------
+    points_px : ndarray, shape (n, 2)
+        Start curve (x, y) from root to tip.
+    width_px, length_px : float
+        Rough width and length.
+    root : {"clamp", "border", "free"}
+        What it grows from.
+    contacts : int
+        Separate places where it touches something fat or the border.
+    ratio : float
+        Light on it relative to the background.
+    """
+
+    points_px: Array
+    width_px: float
+    length_px: float
+    root: Root
+    contacts: int
+    ratio: float
+
+    @property
+    def slenderness(self) -> float:
+        """Length over width."""
+        return self.length_px / self.width_px
+
+
+def find_candidates(binary: Binary) -> list[Candidate]:
+    """Return the long thin things of a picture, longest first.
+
+    Parameters
+    ----------
+    binary : Binary
+        The mask.
+
+    Returns
+    -------
+    list of Candidate
+        Possibly empty.
+    """
+    contours, tree = cv2.findContours(
+        binary.mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE
+    )
+    if tree is None:
+        return []
+    tree = np.reshape(tree, (-1, 4))
+    found: list[Candidate] = []
+    least = 0.04 * max(binary.mask.shape)
+    for index in range(len(contours)):
+        if tree[index, 3] >= 0:
+            continue
+        x, y, w, h = cv2.boundingRect(contours[index])
+        if max(w, h) < least:
+            continue
+        roi = _fill(contours, tree, index, (x, y, w, h))
+        found.extend(_thin_parts(roi, (x, y), binary))
+    found.sort(key=lambda item: -item.length_px)
+    return found
+
+
+def _fill(
+    contours: object,
+    tree: NDArray[np.int32],
+    index: int,
+    box: tuple[int, int, int, int],
+) -> Mask:
+    """Draw one thing with a frame of 1 px; slits (glare) are closed, holes stay."""
+    x, y, w, h = box
+    roi = np.zeros((h + 2, w + 2), np.uint8)
+    offset = (1 - x, 1 - y)
+    cv2.drawContours(roi, contours, index, 1, cv2.FILLED, offset=offset)  # type: ignore[call-overload]
+    child = int(tree[index, 2])
+    while child >= 0:
+        hole = contours[child]  # type: ignore[index]
+        area = cv2.contourArea(hole)
+        if 2.0 * area > 5.0 * cv2.arcLength(hole, closed=True):
+            cv2.drawContours(roi, contours, child, 0, cv2.FILLED, offset=offset)  # type: ignore[call-overload]
+        child = int(tree[child, 0])
+    return roi
+
+
+def _thin_parts(roi: Mask, origin: tuple[int, int], binary: Binary) -> list[Candidate]:
+    depth = _edge_distance(roi, origin, binary)
+    half = _ridge_half_width(depth)
+    if half is None:
+        return []
+    reach = 1.5 * half + 1.0
+    core = depth > reach
+    fat = np.zeros_like(roi)
+    if core.any():
+        away = cv2.distanceTransform((~core).view(np.uint8), cv2.DIST_L2, 5)
+        fat = (away <= reach + 1.0).view(np.uint8)
+    thin = roi & ~fat & 1
+    parts, _ = cv2.findContours(thin, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    found = []
+    for part in parts:
+        if len(part) < 8.0 * half:
+            continue
+        x, y, w, h = cv2.boundingRect(part)
+        # One frame pixel stays around, so that contacts show.
+        x0, y0 = max(x - 2, 0), max(y - 2, 0)
+        window = (slice(y0, y + h + 2), slice(x0, x + w + 2))
+        piece = np.zeros(thin[window].shape, np.uint8)
+        cv2.drawContours(piece, [part], 0, 1, cv2.FILLED, offset=(-x0, -y0))
+        piece &= thin[window]
+        place = (origin[0] - 1 + x0, origin[1] - 1 + y0)
+        candidate = _trace(piece, fat[window], depth[window], place, half, binary)
+        if candidate is not None:
+            found.append(candidate)
+    return found
+
+
+def _edge_distance(
+    roi: Mask, origin: tuple[int, int], binary: Binary
+) -> NDArray[np.float32]:
+    """Return the distance to the paper; the border of the picture is no paper."""
+    height, width = binary.mask.shape
+    x, y = origin
+    h, w = roi.shape[0] - 2, roi.shape[1] - 2
+    padded = roi.copy()
+    if x == 0:
+        padded[:, 0] = padded[:, 1]
+    if y == 0:
+        padded[0] = padded[1]
+    if x + w == width:
+        padded[:, -1] = padded[:, -2]
+    if y + h == height:
+        padded[-1] = padded[-2]
+    grown = cv2.copyMakeBorder(padded, 40, 40, 40, 40, cv2.BORDER_REPLICATE)
+    if x > 0:
+        grown[:, :40] = 0
+    if y > 0:
+        grown[:40] = 0
+    if x + w < width:
+        grown[:, -40:] = 0
+    if y + h < height:
+        grown[-40:] = 0
+    depth = np.asarray(cv2.distanceTransform(grown, cv2.DIST_L2, 5))
+    return depth[40:-40, 40:-40] * roi
+
+
+def _ridge_half_width(depth: NDArray[np.float32]) -> float | None:
+    """Return the half width that a long and thin part of the medial axis shares."""
+    top = cv2.dilate(depth, np.ones((3, 3), np.uint8))
+    ridge = depth[(depth >= top - 0.6) & (depth >= 0.9)]
+    if ridge.size < 8:
+        return None
+    bins = np.floor(np.log(ridge) / 0.09).astype(int)
+    lowest = int(bins.min())
+    bins -= lowest
+    near = np.convolve(np.bincount(bins), [1, 1, 1, 1, 1], mode="same")
+    width = np.exp(0.09 * (lowest + np.arange(len(near))))
+    best = int(np.argmax(near / np.sqrt(width)))
+    return float(np.median(ridge[np.abs(bins - best) <= 2]))
+
+
+def _trace(
+    piece: Mask,
+    fat: Mask,
+    depth: NDArray[np.float32],
+    place: tuple[int, int],
+    half: float,
+    binary: Binary,
+) -> Candidate | None:
+    area = int(piece.sum())
+    if area < 4.0 * LEAST_SLENDERNESS * half * half:
+        return None
+    touching, contacts = _contact(piece, cv2.dilate(fat, np.ones((5, 5), np.uint8)))
+    at_border, border_contacts = _contact(piece, _border(piece.shape, place, binary))
+    root: Root = "free"
+    seeds = None
+    if contacts:
+        root, seeds = "clamp", touching
+    elif border_contacts:
+        root, seeds = "border", at_border
+    curve = _level_sets(piece, seeds, half)
+    if curve is None:
+        return None
+    steps = np.hypot(*np.diff(curve, axis=0).T)
+    length = float(steps.sum()) + (2.0 if root == "free" else 1.0) * half
+    width = max(2.0 * half, 1.0)
+    if length < LEAST_SLENDERNESS * width:
+        return None
+    ridge = piece.astype(bool) & (depth > 0.6 * half)
+    y, x = np.nonzero(ridge)
+    light = binary.ratio[
+        np.clip(y + place[1], 0, binary.ratio.shape[0] - 1),
+        np.clip(x + place[0], 0, binary.ratio.shape[1] - 1),
+    ]
+    f = binary.factor
+    return Candidate(
+        points_px=(curve + np.array(place) + 0.5) * f - 0.5,
+        width_px=width * f,
+        length_px=length * f,
+        root=root,
+        contacts=contacts + border_contacts,
+        ratio=float(np.median(light)) if light.size else 1.0,
+    )
+
+
+def _contact(piece: Mask, other: Mask) -> tuple[Mask, int]:
+    """Return the pixels where two masks meet and the number of separate places."""
+    both = piece & other
+    if not both.any():
+        return both, 0
+    grown = cv2.dilate(both, np.ones((5, 5), np.uint8))
+    return both, cv2.connectedComponents(grown)[0] - 1
+
+
+def _border(shape: tuple[int, ...], place: tuple[int, int], binary: Binary) -> Mask:
+    """Mark the outermost pixels of the picture inside a window."""
+    height, width = binary.mask.shape
+    inside = np.zeros(shape, np.uint8)
+    rows = np.arange(shape[0]) + place[1]
+    columns = np.arange(shape[1]) + place[0]
+    inside[(rows <= 0) | (rows >= height - 1)] = 1
+    inside[:, (columns <= 0) | (columns >= width - 1)] = 1
+    return inside
+
+
+def _level_sets(piece: Mask, seeds: Mask | None, half: float) -> Array | None:
+    """Return the centres of the geodesic level sets, shape (n, 2), root to tip."""
+    smooth = piece
+    if half >= 3.0:
+        size = 2 * int(0.35 * half) + 1
+        kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
+        smooth = cv2.morphologyEx(piece, cv2.MORPH_OPEN, kernel) | (
+            piece & seeds if seeds is not None else 0
+        )
+    smooth = np.ascontiguousarray(smooth, dtype=np.uint8)
+    if seeds is None:
+        first = np.argmax(smooth)
+        far = np.zeros_like(smooth)
+        far.flat[first] = 1
+        distance = _geodesic(smooth, far)
+        seeds = np.zeros_like(smooth)
+        seeds.flat[int(np.argmax(distance))] = 1
+    distance = _geodesic(smooth, np.ascontiguousarray(seeds & smooth))
+    step = max(1.0, half)
+    top = float(distance.max())
+    if top < 4.0 * step:
+        return None
+    y, x = np.nonzero(distance >= 0.0)
+    index = (distance[y, x] / step).astype(np.int64)
+    count = np.bincount(index).astype(np.float64)
+    if np.any(count == 0):
+        return None
+    curve = np.column_stack(
+        [np.bincount(index, weights=x) / count, np.bincount(index, weights=y) / count]
+    )
+    return curve[:-1] if count[-1] < 0.5 * np.median(count) else curve
+
+
+@njit(cache=True)
+def _geodesic(mask: Mask, seeds: Mask) -> NDArray[np.float32]:
+    """Distance from the seeds inside the mask (8 neighbours); -1 where unreached."""
+    height, width = mask.shape
+    distance = np.full((height, width), -1.0, dtype=np.float32)
+    size = height * width + 1
+    queue = np.empty(size, dtype=np.int64)
+    waiting = np.zeros(height * width, dtype=np.uint8)
+    head, tail = 0, 0
+    for i in range(height):
+        for j in range(width):
+            if seeds[i, j] and mask[i, j]:
+                distance[i, j] = 0.0
+                queue[tail] = i * width + j
+                waiting[i * width + j] = 1
+                tail += 1
+    while head != tail:
+        place = queue[head]
+        head = (head + 1) % size
+        waiting[place] = 0
+        i, j = place // width, place % width
+        for di in range(-1, 2):
+            for dj in range(-1, 2):
+                k, m = i + di, j + dj
+                if k < 0 or m < 0 or k >= height or m >= width or mask[k, m] == 0:
+                    continue
+                step = 1.0 if di == 0 or dj == 0 else 1.41421356
+                new = distance[i, j] + np.float32(step)
+                old = distance[k, m]
+                if old < 0.0 or new < old - 1e-4:
+                    distance[k, m] = new
+                    spot = k * width + m
+                    if waiting[spot] == 0:
+                        waiting[spot] = 1
+                        queue[tail] = spot
+                        tail = (tail + 1) % size
+    return distance

@@ -1,0 +1,252 @@
+"""From a rod in pixels to the specimen frame in mm, the rod's own body allowed for.
+
+A square rod seen obliquely shows a side face, and an end face: the silhouette is wider
+than the top face and reaches past the axis' end. Its middle is the axis. With g the
+shift in the picture of a point per mm of height (from the calibration), n across and t
+along the rod, m the pixels per mm: the silhouette of a side a is a (m + |g.n|) wide, it
+ends |g.t| a / 2 past the axis' tip, and the clamp's front plane appears shifted by
+(g.t) z at a height z above the axis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .calibration import Calibration
+from .centreline_fit import Curve
+from .measurement import Measurement, Pose
+from .refine import LostError, Refined
+from .rod import Candidate
+
+Array = NDArray[np.float64]
+
+POINTS = 121
+"""Points of a measured centreline."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setting:
+    """What is known beside the photograph; see `extract`."""
+
+    calibration: Calibration | None
+    rod_height_mm: float
+    joints_mm: tuple[float, ...]
+    length_mm: float | None
+    clamp_height_mm: float | None
+
+    def joints_px(self, curve: Curve) -> Sequence[float]:
+        """Return the joints as arc lengths in px on a curve."""
+        if not self.joints_mm:
+            return ()
+        if self.calibration is None:
+            if self.length_mm is None:
+                return ()
+            scale = curve.s[-1] / self.length_mm
+            return [scale * joint for joint in self.joints_mm]
+        points = self.calibration.to_mm(curve.points, height_mm=self.rod_height_mm)
+        s_mm = _arc(points)
+        return [float(np.interp(joint, s_mm, curve.s)) for joint in self.joints_mm]
+
+
+@dataclass(frozen=True, slots=True)
+class _Local:
+    """The camera at a point of the rod: px per mm along and across, and per height."""
+
+    along: float
+    across: float
+    rise_along: float
+    rise_across: float
+
+
+def measurement(
+    refined: Refined, candidate: Candidate, setting: Setting
+) -> Measurement:
+    """Return the measurement of a refined rod, without doubts yet."""
+    curve = refined.fit.curve
+    width = float(np.median(refined.width[refined.good]))
+    if setting.calibration is None:
+        first, last = _ends_px(refined)
+        return _uncalibrated(refined, first, last, width)
+    return _calibrated(refined, setting, setting.calibration, curve)
+
+
+def _ends_px(refined: Refined) -> tuple[float, float]:
+    """Arc lengths of clamp and tip with nothing known of the camera."""
+    return 0.0, refined.tip.s
+
+
+def _uncalibrated(
+    refined: Refined, first: float, last: float, width: float
+) -> Measurement:
+    s = np.linspace(first, last, POINTS)
+    points, theta = refined.fit.curve.at(s)
+    table = _pixel_columns(refined, s, points, theta)
+    empty = np.full(POINTS, np.nan)
+    for name in ("s_mm", "x_mm", "y_mm", "kappa_per_mm", "width_mm", "sigma_mm",
+                 "sigma_kappa_per_mm", "sigma_width_mm"):  # fmt: skip
+        table[name] = empty
+    table["theta_rad"] = -(theta - theta[0])
+    return Measurement(
+        status="ok",
+        points=table,
+        length_px=last - first,
+        width_px=width,
+        clamp_px=(float(points[0, 0]), float(points[0, 1])),
+        tip_px=(float(points[-1, 0]), float(points[-1, 1])),
+    )
+
+
+def _pixel_columns(
+    refined: Refined, s: Array, points: Array, theta: Array
+) -> dict[str, Array]:
+    fit = refined.fit
+    grid = fit.curve.s
+    width = np.interp(s, grid, refined.width)
+    right = np.column_stack([-np.sin(theta), np.cos(theta)]) * 0.5 * width[:, None]
+    return {
+        "x_px": points[:, 0],
+        "y_px": points[:, 1],
+        "width_px": width,
+        "sigma_px": np.interp(s, grid, fit.sigma),
+        "sigma_theta_rad": np.interp(s, grid, fit.sigma_theta),
+        "left_x_px": points[:, 0] - right[:, 0],
+        "left_y_px": points[:, 1] - right[:, 1],
+        "right_x_px": points[:, 0] + right[:, 0],
+        "right_y_px": points[:, 1] + right[:, 1],
+        "good": (np.interp(s, grid, refined.good.astype(float)) > 0.5).astype(float),
+    }
+
+
+def _calibrated(
+    refined: Refined, setting: Setting, camera: Calibration, curve: Curve
+) -> Measurement:
+    height = setting.rod_height_mm
+    at_root, at_tip = (
+        _local(camera, curve, 0, height),
+        _local(camera, curve, -1, height),
+    )
+    width = refined.width
+    side_mm = float(np.median(width[refined.good])) / (
+        0.5 * (at_root.across + at_tip.across)
+        + 0.5 * (abs(at_root.rise_across) + abs(at_tip.rise_across))
+    )
+    last = refined.tip.s - 0.5 * side_mm * abs(at_tip.rise_along)
+    first = _root(refined, at_root, setting, side_mm)
+    s = np.linspace(first, last, max(int(2.0 * (last - first)), 4 * POINTS))
+    points, theta = curve.at(s)
+    xy = camera.to_mm(points, height_mm=height)
+    if not np.all(np.isfinite(xy)):
+        raise LostError(
+            "calibration_mismatch",
+            "the calibration sees no plane where the rod is; calibrate again",
+        )
+    return _in_frame(refined, setting, s, points, theta, xy, camera)
+
+
+def _in_frame(
+    refined: Refined, setting: Setting, s: Array, points: Array, theta: Array,
+    xy: Array, camera: Calibration,
+) -> Measurement:  # fmt: skip
+    height = setting.rod_height_mm
+    tangent = 0.5 * np.column_stack([np.cos(theta), np.sin(theta)])
+    step = camera.to_mm(points + tangent, height_mm=height) - camera.to_mm(
+        points - tangent, height_mm=height
+    )
+    stretch = np.hypot(step[:, 0], step[:, 1])
+    heading = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
+    s_mm = _arc(xy)
+    pose = Pose(
+        x_mm=float(xy[0, 0]), y_mm=float(xy[0, 1]),
+        angle_deg=float(np.degrees(heading[0])), height_mm=height,
+    )  # fmt: skip
+    local = pose.from_board(xy)
+    grid = refined.fit.curve
+    kappa_px = np.interp(s, grid.s, grid.kappa)
+    # y runs down in the picture: there the heading turns the other way.
+    kappa = (np.gradient(heading + theta, s) - kappa_px) / stretch
+    even = np.linspace(0.0, s_mm[-1], POINTS)
+    s_px = np.interp(even, s_mm, s)
+    pixel, angle = grid.at(s_px)
+    table = _pixel_columns(refined, s_px, pixel, angle)
+    scale = np.interp(even, s_mm, stretch)
+    across = _across(camera, pixel, angle, height)
+    table |= {
+        "s_mm": even,
+        "x_mm": np.interp(even, s_mm, local[:, 0]),
+        "y_mm": np.interp(even, s_mm, local[:, 1]),
+        "theta_rad": np.interp(even, s_mm, heading - heading[0]),
+        "kappa_per_mm": np.interp(even, s_mm, kappa),
+        "width_mm": table["width_px"] / across,
+        "sigma_mm": table["sigma_px"] * scale,
+        "sigma_kappa_per_mm": np.interp(s_px, grid.s, refined.fit.sigma_kappa) / scale,
+        "sigma_width_mm": np.interp(s_px, grid.s, refined.sigma_width) / across,
+    }
+    return Measurement(
+        status="ok",
+        points=table,
+        length_mm=float(s_mm[-1]),
+        tip_mm=(float(local[-1, 0]), float(local[-1, 1])),
+        tip_angle_deg=float(np.degrees(heading[-1] - heading[0])),
+        width_mm=float(np.median(table["width_mm"][table["good"] > 0.5])),
+        length_px=float(s[-1] - s[0]),
+        width_px=float(np.median(refined.width[refined.good])),
+        clamp_px=(float(points[0, 0]), float(points[0, 1])),
+        tip_px=(float(points[-1, 0]), float(points[-1, 1])),
+        pose=pose,
+    )
+
+
+def _root(refined: Refined, local: _Local, setting: Setting, side_mm: float) -> float:
+    """Return the arc length in px at which the axis leaves the clamp.
+
+    The clamp's front plane is seen at the top of the rod (its face) and at the paper
+    (its front line), if the camera looks at it; else only the clamp's top edge is.
+    """
+    if refined.clamp is None:
+        return 0.0
+    rise = local.rise_along
+    face, front = refined.clamp.face, refined.clamp.front
+    if rise > 0.0:
+        line = face or front
+        seen = 0.0 if line is None else line.s
+        top = setting.clamp_height_mm
+        return seen if top is None else seen - rise * (top - setting.rod_height_mm)
+    if face is not None:
+        return face.s - 0.5 * rise * side_mm
+    return 0.0 if front is None else front.s + rise * setting.rod_height_mm
+
+
+def _local(camera: Calibration, curve: Curve, index: int, height: float) -> _Local:
+    point = curve.points[index]
+    t, n = curve.tangents[index], curve.normals[index]
+    around = np.array([point - t, point + t, point - n, point + n])
+    mm = camera.to_mm(around, height_mm=height)
+    along = 2.0 / float(np.hypot(*(mm[1] - mm[0])))
+    across = 2.0 / float(np.hypot(*(mm[3] - mm[2])))
+    at = camera.to_mm(point[None], height_mm=height)
+    rise = (
+        camera.to_px(at, height_mm=height + 0.5)
+        - camera.to_px(at, height_mm=height - 0.5)
+    )[0]
+    return _Local(along, across, float(rise @ t), float(rise @ n))
+
+
+def _across(camera: Calibration, points: Array, theta: Array, height: float) -> Array:
+    """Pixels of silhouette per mm of side, at points of the rod, shape (n,)."""
+    normal = np.column_stack([-np.sin(theta), np.cos(theta)])
+    span = camera.to_mm(points + normal, height_mm=height) - camera.to_mm(
+        points - normal, height_mm=height
+    )
+    at = camera.to_mm(points, height_mm=height)
+    rise = camera.to_px(at, height_mm=height + 0.5) - camera.to_px(
+        at, height_mm=height - 0.5
+    )
+    return 2.0 / np.hypot(*span.T) + np.abs(np.sum(rise * normal, axis=1))
+
+
+def _arc(points: Array) -> Array:
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])

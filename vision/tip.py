@@ -1,0 +1,201 @@
+"""The free end of a rod: a flat face, found sub-pixel.
+
+Skeletons end half a width early or fork into the corners. Here the curve is carried
+past the end; lanes along it, over the middle of the width, are crossed at half level
+between rod and paper, and a straight line through the crossings is the end face.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .centreline_fit import Curve
+from .edges import sample
+
+Array = NDArray[np.float64]
+Image = NDArray[np.float32]
+
+STEP_PX = 0.5
+_LANES = 13
+_SHARE = 0.62
+"""Part of the width that the lanes cover: clear of blurred or rounded corners."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EndFace:
+    """Where lanes along a rod cross an end.
+
+    Parameters
+    ----------
+    s : float
+        Arc length at which the axis meets the line through the crossings, px.
+    sigma : float
+        Its standard deviation, px.
+    skew : float
+        Slope of the line against the normal, px per px.
+    scatter : float
+        RMS distance of the crossings from the line, px.
+    found : float
+        Part of the lanes that crossed.
+    """
+
+    s: float
+    sigma: float
+    skew: float
+    scatter: float
+    found: float
+
+
+def lanes(
+    grey: Image, curve: Curve, s: Array, across: Array, sign: float = 1.0
+) -> Array:
+    """Sample lanes along a curve, carried past its ends.
+
+    Parameters
+    ----------
+    grey : ndarray, shape (height, width), float32
+        Linear light.
+    curve : Curve
+        The axis.
+    s : ndarray, shape (m,)
+        Arc lengths.
+    across : ndarray, shape (k,)
+        Offsets along the normal (to the right in the picture).
+    sign : float
+        -1 for a light rod.
+
+    Returns
+    -------
+    ndarray, shape (k, m)
+        Light; NaN outside the picture.
+    """
+    points, theta = curve.at(s)
+    x = points[:, 0] - across[:, None] * np.sin(theta)
+    y = points[:, 1] + across[:, None] * np.cos(theta)
+    return sign * sample(grey, x, y)
+
+
+def find_tip(
+    grey: Image,
+    curve: Curve,
+    *,
+    expected: float,
+    width: float,
+    blur: float,
+    reach: float,
+    middle: float = 0.0,
+    sign: float = 1.0,
+) -> EndFace | None:
+    """Find the end face near an expected arc length.
+
+    Parameters
+    ----------
+    grey : ndarray, shape (height, width), float32
+        Linear light.
+    curve : Curve
+        The axis, from clamp to about the tip.
+    expected, reach : float
+        Where to look along s, and how far to either side, px.
+    width, blur : float
+        Width of the rod and standard deviation of the blur, px.
+    middle : float
+        Offset of the lanes' centre from the curve, px.
+    sign : float
+        -1 for a light rod.
+
+    Returns
+    -------
+    EndFace or None
+        None where fewer than half of the lanes cross.
+    """
+    near = max(1.5, 2.2 * blur)
+    inner = max(4.0, 0.5 * width)
+    outer = max(4.0, 3.0 * blur)
+    s = np.arange(
+        expected - reach - near - inner,
+        expected + reach + near + outer + STEP_PX,
+        STEP_PX,
+    )
+    across = middle + np.linspace(-0.5, 0.5, _LANES) * _SHARE * width
+    light = lanes(grey, curve, s, across, sign)
+    place = _rough_end(np.nanmean(light[3:-3], axis=0), s, expected, reach, near, inner)
+    if place is None:
+        return None
+    crossing = np.full(_LANES, np.nan)
+    for k, row in enumerate(light):
+        crossing[k] = crossing_of(row, s, place, near, inner, outer, reach=0.5 * width)
+    return line_through(across - middle, crossing)
+
+
+def line_through(across: Array, crossing: Array) -> EndFace | None:
+    """Fit a line to lane crossings, the worst ones dropped."""
+    good = np.isfinite(crossing)
+    if good.sum() < 0.5 * len(crossing):
+        return None
+    for _ in range(3):
+        slope, place = np.polyfit(across[good], crossing[good], 1)
+        residual = crossing - place - slope * across
+        spread = 1.4826 * np.nanmedian(np.abs(residual[good])) + 0.02
+        kept = np.isfinite(crossing) & (np.abs(residual) < 3.5 * spread)
+        if kept.sum() < 4 or np.array_equal(kept, good):
+            break
+        good = kept
+    scatter = float(np.sqrt(np.mean(residual[good] ** 2)))
+    return EndFace(
+        s=float(place),
+        sigma=float(scatter / np.sqrt(good.sum()) + 0.005),
+        skew=float(slope),
+        scatter=scatter,
+        found=float(np.isfinite(crossing).mean()),
+    )
+
+
+def _rough_end(
+    profile: Array, s: Array, expected: float, reach: float, near: float, inner: float
+) -> float | None:
+    """Find where the mean lane leaves the rod: the first time, going outwards."""
+    finite = np.isfinite(profile)
+    if finite.sum() < 8:
+        return None
+    start = s < expected - reach - near
+    rod = float(np.nanmedian(profile[start])) if (finite & start).any() else np.nan
+    paper = float(np.nanquantile(profile[s > expected], 0.75))
+    if not paper > rod:
+        return None
+    above = (profile > 0.5 * (rod + paper)) & (s >= expected - reach)
+    above &= s <= expected + reach
+    hits = np.flatnonzero(above)
+    return float(s[hits[0]]) if hits.size else None
+
+
+def crossing_of(
+    row: Array, s: Array, place: float, near: float, inner: float, outer: float,
+    *, reach: float,
+) -> float:  # fmt: skip
+    """Return where a lane crosses half level near `place`, going outwards (s rising).
+
+    The level beyond is a straight line carried to the edge, as beside the rod.
+    """
+    inside = (s >= place - near - inner) & (s <= place - near) & np.isfinite(row)
+    beyond = (s >= place + near) & (s <= place + near + outer) & np.isfinite(row)
+    if inside.sum() < 3 or beyond.sum() < 3:
+        return float("nan")
+    low = float(np.mean(row[inside]))
+    high = float(np.mean(row[beyond]))
+    if not high > low:
+        return float("nan")
+    level = 0.5 * (low + high)
+    rises = np.flatnonzero((row[:-1] < level) & (row[1:] >= level))
+    rises = rises[(np.abs(s[rises] - place) <= reach)]
+    if rises.size == 0:
+        return float("nan")
+    k = int(rises[np.argmin(np.abs(s[rises] - place))])
+    first, last = max(k - 1, 0), min(k + 3, len(s))
+    slope, base = np.polyfit(s[first:last] - s[k], row[first:last], 1)
+    at = float(s[k] + (level - base) / slope) if slope > 0.0 else float("nan")
+    if not abs(at - s[k] - 0.5 * STEP_PX) <= 2.0 * STEP_PX:
+        at = float(s[k] + STEP_PX * (level - row[k]) / (row[k + 1] - row[k]))
+    return at

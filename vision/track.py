@@ -1,0 +1,133 @@
+"""From a rough curve inside the rod to a start for the edge fit.
+
+The mask ends early where the clamp's shadow darkens the paper around the root. Profiles
+across the rod still show it there, so the curve is carried on in short steps, each
+centred between the edges, until there are no two edges a rod's width apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .centreline_fit import Curve, fit_curve
+from .edges import rough_edges
+
+Array = NDArray[np.float64]
+Image = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Start:
+    """A curve within a pixel or two of the axis.
+
+    Parameters
+    ----------
+    curve : Curve
+        From near the clamp to near the tip.
+    width : float
+        Width of the rod, px.
+    """
+
+    curve: Curve
+    width: float
+
+
+def start_curve(
+    grey: Image, points: Array, width: float, *, sign: float, follow: bool
+) -> Start | None:
+    """Centre a rough curve between its edges and carry it towards the clamp.
+
+    Parameters
+    ----------
+    grey : ndarray, shape (height, width), float32
+        Linear light.
+    points : ndarray, shape (n, 2)
+        Rough curve inside the rod, root to tip.
+    width : float
+        Rough width, px, perhaps with a shadow.
+    sign : float
+        -1 for a light rod.
+    follow : bool
+        Whether to carry the curve on at the root.
+
+    Returns
+    -------
+    Start or None
+        None where no two edges are seen along most of the curve.
+    """
+    curve = smooth_curve(points, spacing=2.0 * width)
+    low, high, level = rough_edges(
+        grey, curve.points, curve.normals, reach=0.5 * width + 6.0, sign=sign
+    )
+    across = high - low
+    found = np.isfinite(across) & (across > 1.0)
+    if found.sum() < 0.5 * len(across):
+        return None
+    real = float(np.median(across[found]))
+    good = found & (np.abs(across - real) < 0.3 * real + 1.0)
+    if good.sum() < 0.5 * len(across):
+        return None
+    centre = curve.points + (0.5 * (low + high))[:, None] * curve.normals
+    centres = centre[good][:: max(1, int(0.4 * real))]
+    if follow:
+        centres = _follow(grey, centres[2:], real, sign, level)
+    return Start(curve=smooth_curve(centres, spacing=2.0 * real), width=real)
+
+
+def smooth_curve(points: Array, *, spacing: float) -> Curve:
+    """Fit a curve to a coarse polyline, on an even grid of about 1 px."""
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    keep = np.concatenate([[True], steps > 1e-6])
+    points = points[keep]
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    count = max(int(along[-1]), 16)
+    s = np.linspace(0.0, along[-1], count + 1)
+    even = np.column_stack([np.interp(s, along, points[:, k]) for k in (0, 1)])
+    window = max(1, int(0.25 * spacing))
+    chord = np.empty_like(even)
+    index = np.arange(len(s))
+    ahead = np.minimum(index + window, len(s) - 1)
+    behind = np.maximum(index - window, 0)
+    chord = even[ahead] - even[behind]
+    theta = np.unwrap(np.arctan2(chord[:, 1], chord[:, 0]))
+    fit = fit_curve(
+        s, even, np.ones(len(s)), spacing=spacing, iterations=3, theta=theta
+    )
+    return fit.curve
+
+
+def _follow(
+    grey: Image, centres: Array, width: float, sign: float, level: float
+) -> Array:
+    """Carry centres on at the root end, at most seven widths."""
+    step = max(2.0, 0.25 * width)
+    recent = [np.asarray(c) for c in centres[:12]]
+    added: list[Array] = []
+    while len(added) * step < 7.0 * width and len(recent) >= 4:
+        point, direction = _predict(np.array(recent[:12]), step)
+        normal = np.array([-direction[1], direction[0]])
+        low, high, _ = rough_edges(
+            grey, point[None], normal[None],
+            reach=0.5 * width + 4.0, sign=sign, level=level,
+        )  # fmt: skip
+        across = float(high[0] - low[0])
+        aside = 0.5 * float(high[0] + low[0])
+        if not abs(across - width) < 0.2 * width + 0.5 or abs(aside) > 0.2 * width:
+            break
+        point = point + aside * normal
+        added.insert(0, point)
+        recent.insert(0, point)
+    return np.concatenate([np.array(added).reshape(-1, 2), centres])
+
+
+def _predict(recent: Array, step: float) -> tuple[Array, Array]:
+    """Return the next point before the first and the unit direction root to tip."""
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(recent, axis=0).T))])
+    degree = 2 if len(recent) >= 6 else 1
+    x, y = (np.polynomial.Polynomial.fit(along, recent[:, k], degree) for k in (0, 1))
+    point = np.array([x(-step), y(-step)])
+    direction = np.array([x.deriv()(-step), y.deriv()(-step)])
+    return point, direction / np.hypot(*direction)
