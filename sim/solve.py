@@ -96,7 +96,7 @@ def solve(
         STEP,
     )
     if outcome > GONE:
-        raise _failure(outcome, specimen, field, load)
+        raise failure(outcome, specimen, field, load)
     centreline = None
     if outcome != GONE:
         centreline = Centreline(
@@ -117,9 +117,10 @@ def solve(
     )
 
 
-def _failure(
+def failure(
     outcome: int, specimen: Specimen, field: Field, load: float
 ) -> InputError | SolverError:
+    """Return the error that says why the kernel gave no answer."""
     if outcome == TOUCHES:
         gap_mm = getattr(field, "gap_mm", float("nan"))
         return InputError(
