@@ -15,6 +15,7 @@ import numpy as np
 
 from ..core.errors import CameraError
 from .camera import Image
+from .camera_mjpeg import decode_jpeg
 from .clock import Clock
 from .config import CameraConfig
 
@@ -49,6 +50,7 @@ class OpenCvSource:
         self._clock = clock
         self._capture: cv2.VideoCapture | None = None
         self._settings: dict[str, Any] = {}
+        self._is_raw = False
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -80,12 +82,22 @@ class OpenCvSource:
                 f"cameras that answer"
             )
         self._settings = self._lock(self._capture)
+        # Undecoded parts of a motion JPEG show what the decoder hides: a missing end.
+        code = int(self._capture.get(cv2.CAP_PROP_FOURCC))
+        is_network = isinstance(self._source, str) and "://" in self._source
+        self._is_raw = (
+            is_network
+            and code == cv2.VideoWriter.fourcc(*"MJPG")
+            and self._capture.set(cv2.CAP_PROP_FORMAT, -1)
+        )
 
     def read(self) -> tuple[Image, float]:
         """Return the next picture and when its reading began.
 
         Raises
         ------
+        BrokenPictureError
+            If a motion JPEG part is no whole JPEG.
         CameraError
             If the device gives none: it is dead then, and must be opened anew.
         """
@@ -95,6 +107,8 @@ class OpenCvSource:
         is_read, image = self._capture.read()
         if not is_read or image is None:
             raise CameraError(f"camera {self._source!r} stalled or was closed")
+        if self._is_raw:
+            return decode_jpeg(image.tobytes()), began_s
         return np.asarray(image), began_s
 
     def close(self) -> None:

@@ -10,7 +10,14 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import (
+    AfterValidator,
+    ConfigDict,
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveInt,
+)
 
 from ..core.errors import ConfigError
 from ..core.toml import FileModel, read_toml
@@ -60,13 +67,16 @@ class ReadModel(FileModel):
     `frame_start` to `frame_end`. The `pattern` must match a whole reply.
     """
 
+    # Line ends are white space: they must not be stripped off the keys that hold them.
+    model_config = ConfigDict(str_strip_whitespace=False)
+
     mode: Literal["query", "stream", "frame"]
     command: str = ""
     command_end: str = "\n"
-    reply_end: str = "\n"
+    reply_end: str = Field(default="\n", min_length=1)
     pattern: Pattern
-    frame_start: str = "\x02"
-    frame_end: str = "\r"
+    frame_start: str = Field(default="\x02", min_length=1)
+    frame_end: str = Field(default="\r", min_length=1)
     frame_bytes: PositiveInt | None = None
     decimal_comma: bool = False
     negative: tuple[str, ...] = ("-",)

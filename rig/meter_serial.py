@@ -18,6 +18,7 @@ from ..core.errors import MeterError
 from .meter import Flux, Sample, combine
 from .meter_description import MeterDescription
 from .meter_parse import parse_multiplier, parse_reply, parse_unit
+from .virtual import register_twin_urls
 
 logger = logging.getLogger(__name__)
 
@@ -65,6 +66,7 @@ class SerialMeter:
         self._sign = sign
         self._tap = tap
         self._last_s = 0.0
+        self._buffer = b""
         self._device = self._open()
         try:
             for command in description.setup:
@@ -118,6 +120,7 @@ class SerialMeter:
 
     def _open(self) -> serial.SerialBase:
         line = self._description.line
+        register_twin_urls()
         try:
             device = serial.serial_for_url(
                 self._port, do_not_open=True, baudrate=line.baud, bytesize=line.bits,
@@ -232,22 +235,22 @@ class SerialMeter:
         read = self._description.read
         end = read.reply_end.encode("latin-1")
         deadline_s = time.monotonic() + read.timeout_s
-        data = b""
-        while time.monotonic() < deadline_s and len(data) < _LONGEST_REPLY:
-            byte = self._receive(1)
-            data += byte
-            if byte and data.endswith(end):
-                text = data[: -len(end)].decode("latin-1").strip("\r\n\0 ")
+        while time.monotonic() < deadline_s:
+            while end in self._buffer:
+                line, _, self._buffer = self._buffer.partition(end)
+                text = line.decode("latin-1").strip("\r\n\0 ")
                 if text:
                     self._last_s = time.monotonic()
                     return text
-                data = b""
+            if len(self._buffer) > _LONGEST_REPLY:
+                break
+            self._buffer += self._receive()
         return None
 
-    def _receive(self, size: int | None = None) -> bytes:
+    def _receive(self) -> bytes:
+        """Return what is there, or wait one slice for a first byte."""
         try:
-            waiting = self._device.in_waiting if size is None else size
-            data = bytes(self._device.read(max(waiting, 1)))
+            data = bytes(self._device.read(max(self._device.in_waiting, 1)))
         except (OSError, serial.SerialException, TypeError) as error:
             raise self._lost(error) from None
         if data:
@@ -255,6 +258,7 @@ class SerialMeter:
         return data
 
     def _flush(self) -> None:
+        self._buffer = b""
         try:
             self._device.reset_input_buffer()
         except (OSError, serial.SerialException) as error:

@@ -141,9 +141,10 @@ def test_a_backlog_is_skipped(server) -> None:
         assert server.made_s[stamp_of(frame.image)] >= asked_s - 1.0 / server.fps
 
 
-def test_a_truncated_picture_is_never_handed_out(server) -> None:
+@pytest.mark.parametrize("backend", ["mjpeg", "opencv"])
+def test_a_truncated_picture_is_never_handed_out(server, backend: str) -> None:
     server.behave = lambda n, jpeg: jpeg[: len(jpeg) // 2] if n % 2 else jpeg
-    with opened(server.url) as camera:
+    with opened(server.url, backend=backend, frame_timeout_s=3.0) as camera:
         after_s = time.monotonic()
         for _ in range(10):
             frame = camera.grab_after(after_s)
