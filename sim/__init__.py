@@ -23,8 +23,11 @@ if TYPE_CHECKING:
     from .magnet_field import magnet_flux_mT, magnet_gradient_mT_per_mm
     from .magnet_fit import MagnetFit, ReadingVerdict, fit_magnet
     from .sensitivity import Sensitivities, sensitivities
-    from .solve import solve
     from .table1 import gmc
+
+# Now, not when first used: importing the submodule `solve` for itself would leave
+# the module, not the function, under this name.
+from .solve import solve as solve
 
 _HOME = {
     "PULLED_IN": "fields",
@@ -43,7 +46,6 @@ _HOME = {
     "magnet_flux_mT": "magnet_field",
     "magnet_gradient_mT_per_mm": "magnet_field",
     "sensitivities": "sensitivity",
-    "solve": "solve",
     "solve_many": "batch",
 }
 
