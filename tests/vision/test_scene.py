@@ -1,0 +1,116 @@
+"""The photograph-like scene: same seed same picture, and its truth is where it says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from magbend.vision.calibration import specimen_to_px
+from magbend.vision.measurement import Pose
+from magbend.vision.photo import as_photo
+from magbend.vision.scene import (
+    BLACK,
+    BLUE,
+    GREY,
+    Block,
+    Scene,
+    SceneLight,
+    render_scene,
+    scene_camera,
+)
+from magbend.vision.synthetic import curve
+
+CLAMP = Block(pose=Pose(x_mm=15.0, y_mm=-24.0, angle_deg=3.0, height_mm=0.9))
+QUIET = SceneLight(noise=0.0, blur_px=0.3)
+SMALL = scene_camera(size_px=(800, 600), focal_px=3400.0)
+
+
+def photograph(scene, camera=None, seed=0):
+    return render_scene(scene, camera or SMALL, np.random.default_rng(seed))
+
+
+def test_picture_is_colour_of_the_camera_s_size():
+    picture = photograph(Scene(clamp=CLAMP))
+    assert picture.shape == (600, 800, 3)
+    assert picture.dtype == np.uint8
+    assert 150 < np.median(picture) < 240
+
+
+def test_seeds_rule_noise_and_paper():
+    scene = Scene(clamp=CLAMP, centreline=curve("arc", angle_deg=40.0))
+    one = photograph(scene)
+    np.testing.assert_array_equal(one, photograph(scene))
+    assert np.any(one != photograph(scene, seed=1))
+    quiet = replace(scene, light=QUIET)
+    other = replace(quiet, paper_seed=1)
+    assert np.any(photograph(quiet) != photograph(other))
+    # Without noise the generator is not used at all.
+    np.testing.assert_array_equal(photograph(quiet), photograph(quiet, seed=9))
+
+
+@pytest.mark.parametrize("tilt", [0.0, 8.0])
+def test_axis_lies_in_the_middle_of_the_dark_silhouette(tilt):
+    camera = scene_camera(tilt_deg=tilt)
+    line = curve("graded", angle_deg=-70.0)
+    light = replace(QUIET, shadow_depth=0.0)
+    grey = as_photo(
+        photograph(Scene(clamp=CLAMP, centreline=line, light=light), camera)
+    ).grey
+    axis = specimen_to_px(camera, CLAMP.pose, line.points_mm)
+    offsets, step = [], 0.25
+    for i in range(150, len(axis) - 100, 50):
+        tangent = axis[i + 5] - axis[i - 5]
+        normal = np.array([tangent[1], -tangent[0]]) / np.hypot(*tangent)
+        reach = np.arange(-18.0, 18.0 + step, step)
+        x, y = (axis[i] + reach[:, None] * normal).T
+        dark = 0.69 - bilinear(grey, x, y)
+        dark[dark < 0.1] = 0.0
+        offsets.append((dark * reach).sum() / dark.sum())
+    # The side face is a little darker than the top, so allow a fraction of its width.
+    assert np.abs(offsets).max() < 0.25
+    assert abs(np.mean(offsets)) < 0.12
+
+
+def bilinear(grey, x, y):
+    i, j = np.floor(y).astype(int), np.floor(x).astype(int)
+    v, u = y - i, x - j
+    return (
+        (1 - v) * ((1 - u) * grey[i, j] + u * grey[i, j + 1])
+        + v * ((1 - u) * grey[i + 1, j] + u * grey[i + 1, j + 1])
+    )  # fmt: skip
+
+
+def test_empty_clamp_has_no_rod():
+    line = curve("straight")
+    scene = Scene(clamp=CLAMP, centreline=line, light=QUIET)
+    with_rod = as_photo(photograph(scene)).grey
+    without = as_photo(photograph(replace(scene, centreline=None))).grey
+    axis = specimen_to_px(SMALL, CLAMP.pose, line.points_mm[100:-20])
+    x, y = axis.T
+    assert bilinear(with_rod, x, y).max() < 0.12
+    assert bilinear(without, x, y).min() > 0.3
+
+
+@pytest.mark.parametrize("colour", [GREY, BLUE, BLACK])
+def test_clamp_has_its_colour(colour):
+    block = replace(CLAMP, colour=colour, screws_mm=())
+    picture = photograph(Scene(clamp=block, light=replace(QUIET, shadow_depth=0.0)))
+    inside = block.pose.to_board(np.array([[-4.0, 2.0]]))
+    ((x, y),) = SMALL.to_px(inside, height_mm=block.height_mm).astype(int)
+    value = picture[y, x] / 255.0
+    linear = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+    np.testing.assert_allclose(linear, colour, atol=0.04)
+
+
+def test_gloss_and_other_blocks_show():
+    magnet = Block(
+        pose=Pose(x_mm=40.0, y_mm=-52.0, angle_deg=90.0), length_mm=20.0, width_mm=55.0
+    )
+    scene = Scene(clamp=CLAMP, centreline=curve("straight"), light=QUIET)
+    plain = photograph(scene).astype(int)
+    glossy = photograph(replace(scene, light=replace(QUIET, gloss=0.3))).astype(int)
+    assert (glossy - plain).max() > 60
+    blocked = photograph(replace(scene, blocks=(magnet,))).astype(int)
+    assert (plain - blocked).max() > 60
