@@ -2,10 +2,180 @@
 
 from __future__ import annotations
 
-from .console import group
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from . import sim_magnet, sim_sweep
+from .console import group, print_json
+
+if TYPE_CHECKING:
+    from ..core.specimen import Specimen
+    from ..sim.fields import Field, Solution
 
 app = group(
     "sim",
     "Predict shapes: rods, magnets, equilibria, sweeps.",
     "magbend sim shape --gmc 2 --field-mT 50 --angle-deg 90",
 )
+app.command("magnet", epilog=sim_magnet.EXAMPLE)(sim_magnet.magnet)
+app.command("sweep", epilog=sim_sweep.EXAMPLE)(sim_sweep.sweep)
+
+SHAPE_EXAMPLE = (
+    "Example: magbend sim shape --gmc 2 --field-mT 50 --angle-deg 90 --out shape.csv"
+)
+
+
+@app.command("shape", epilog=SHAPE_EXAMPLE)
+def shape(
+    gmc: Annotated[
+        int | None, typer.Option(help="Rod of the paper's Table 1, 1 to 7.")
+    ] = None,
+    specimen: Annotated[Path | None, typer.Option(help="Specimen file (TOML).")] = None,
+    remeasured: Annotated[
+        bool, typer.Option("--remeasured", help="With --gmc: the sides as remeasured.")
+    ] = False,
+    field_mT: Annotated[
+        float | None, typer.Option("--field-mT", help="Uniform flux density in mT.")
+    ] = None,
+    angle_deg: Annotated[
+        float, typer.Option(help="Direction of the uniform field from +x, in deg.")
+    ] = 90.0,
+    magnet: Annotated[Path | None, typer.Option(help="Magnet file (TOML).")] = None,
+    gap_mm: Annotated[
+        float | None, typer.Option(help="From the N face to the undeformed tip, in mm.")
+    ] = None,
+    model: Annotated[str, typer.Option(help="rod, or solid (shear, clamp).")] = "rod",
+    poisson: Annotated[
+        float, typer.Option(help="Poisson's ratio, for --model solid.")
+    ] = 0.49,
+    gravity_m_s2: Annotated[
+        tuple[float, float, float],
+        typer.Option(help="Free fall (x y z) in m/s2; seen from above: 0 0 -9.80665."),
+    ] = (0.0, 0.0, 0.0),
+    density_kg_m3: Annotated[
+        float | None, typer.Option(help="Density in kg/m3, for the weight.")
+    ] = None,
+    clamp_angle_deg: Annotated[
+        float, typer.Option(help="Direction of the clamp from +x, in deg.")
+    ] = 0.0,
+    load_factor: Annotated[float, typer.Option(help="Factor on the magnetism.")] = 1.0,
+    points: Annotated[int, typer.Option(min=61, help="Points of the shape.")] = 61,
+    out: Annotated[Path | None, typer.Option(help="Write the shape as CSV.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Predict the shape of a rod in a uniform field or before a magnet."""
+    from ..sim.fields import Support
+    from ..sim.solve import solve
+
+    rod = _specimen(gmc, specimen, remeasured, density_kg_m3)
+    field = _field(field_mT, angle_deg, magnet, gap_mm)
+    support = Support(
+        clamp_angle_deg=clamp_angle_deg,
+        gravity_m_s2=gravity_m_s2,
+        load_factor=load_factor,
+    )
+    solution = solve(
+        rod, field, support=support, model=model, poisson_ratio=poisson, points=points
+    )
+    data = _summary(rod, model, solution)
+    if out is not None:
+        _write(solution, rod, out)
+    if as_json:
+        print_json(data | _columns(solution))
+    else:
+        _print(data)
+
+
+def _specimen(
+    gmc: int | None, file: Path | None, remeasured: bool, density_kg_m3: float | None
+) -> Specimen:
+    if (gmc is None) == (file is None):
+        raise typer.BadParameter("give either --gmc 1..7 or --specimen FILE")
+    if gmc is not None:
+        from ..sim.table1 import gmc as table1
+
+        rod = table1(gmc, remeasured=remeasured)
+    elif remeasured:
+        raise typer.BadParameter("--remeasured belongs to --gmc")
+    else:
+        from ..core.specimen_file import read_specimen
+
+        rod = read_specimen(Path(str(file)))
+    if density_kg_m3 is not None:
+        from dataclasses import replace
+
+        rod = replace(rod, density_kg_m3=density_kg_m3)
+    return rod
+
+
+def _field(
+    field_mT: float | None, angle_deg: float, file: Path | None, gap_mm: float | None
+) -> Field:
+    from ..sim.fields import MagnetField, UniformField
+
+    if (field_mT is None) == (file is None):
+        raise typer.BadParameter("give either --field-mT B or --magnet FILE")
+    if field_mT is not None:
+        if gap_mm is not None:
+            raise typer.BadParameter("--gap-mm belongs to --magnet")
+        return UniformField(flux_mT=field_mT, angle_deg=angle_deg)
+    if gap_mm is None:
+        raise typer.BadParameter("--magnet needs --gap-mm D")
+    from ..core.specimen_file import read_magnet
+
+    return MagnetField(magnet=read_magnet(Path(str(file))), gap_mm=gap_mm)
+
+
+def _summary(rod: Specimen, model: str, solution: Solution) -> dict[str, Any]:
+    data: dict[str, Any] = {
+        "specimen": rod.name,
+        "model": model,
+        "status": solution.status,
+        "morse_index": solution.morse_index,
+        "load_limit": solution.load_limit,
+    }
+    line = solution.centreline
+    if line is not None:
+        data["tip_mm"] = line.tip_mm
+        data["tip_angle_deg"] = line.tip_angle_deg
+        data["length_mm"] = line.length_mm
+        data["root_moment_Nm"] = solution.root_moment_Nm
+        data["error_mm"] = solution.error_mm
+    data["flux_tip_mT"] = solution.flux_tip_mT
+    return data
+
+
+def _columns(solution: Solution) -> dict[str, Any]:
+    line = solution.centreline
+    if line is None:
+        return {}
+    names = ("s_mm", "x_mm", "y_mm", "theta_rad", "kappa_per_mm")
+    return {name: getattr(line, name) for name in names}
+
+
+def _write(solution: Solution, rod: Specimen, out: Path) -> None:
+    from ..core.errors import SolverError
+
+    if solution.centreline is None:
+        raise SolverError(
+            f"{rod.name} is {solution.status}: its branch ends at "
+            f"{solution.load_limit:.4g} of the load, so there is no shape to write"
+        )
+    solution.centreline.to_csv(out)
+
+
+def _print(data: dict[str, Any]) -> None:
+    typer.echo(f"{data['specimen']}, model {data['model']}: {data['status']}")
+    if "tip_mm" in data:
+        x, y = data["tip_mm"]
+        typer.echo(f"  tip          ({x:.5f}, {y:.5f}) mm")
+        typer.echo(f"  tip angle    {data['tip_angle_deg']:.5f} deg")
+        typer.echo(f"  root moment  {data['root_moment_Nm']:.6g} N m")
+        typer.echo(f"  Morse index  {data['morse_index']}")
+        typer.echo(f"  error        below {data['error_mm']:.1e} mm")
+    else:
+        typer.echo(f"  branch ends  at {data['load_limit']:.4g} of the load")
+    bx, by = data["flux_tip_mT"]
+    typer.echo(f"  flux at tip  ({bx + 0.0:.4f}, {by + 0.0:.4f}) mT")

@@ -280,8 +280,8 @@ def _verdict(
     if abs(needed_mT - flux_mT) <= allowed_mT:
         return "ok"
     return (
-        f"disagrees: alone it gives {alone_T[i]:.4f} T, and the median {median_T:.4f} T "
-        f"of all readings needs {needed_mT:.2f} mT here"
+        f"disagrees: alone it gives {alone_T[i]:.4f} T, and the median of all "
+        f"readings, {median_T:.4f} T, needs {needed_mT:.2f} mT here"
     )
 
 
