@@ -1,0 +1,557 @@
+"""A GRBL 1.1 board (also grblHAL, FluidNC) as a `Stage`.
+
+Motions are absolute jogs in machine coordinates: a jog is refused as a whole when it
+leaves the travel, changes no modal state, and a feed hold forgets it. They are sent in
+pieces, so that a stage whose host dies runs on for one short piece at most. Arrival is
+Idle *and* the position; an ``ok`` only means queued.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import math
+from collections.abc import Iterator
+
+from ..core.errors import StageError
+from . import grbl_audit
+from .clock import Clock
+from .grbl_connect import connect_board
+from .grbl_motion import Target, await_arrival, await_homing, await_stand, stands
+from .grbl_protocol import (
+    FEED_HOLD,
+    SOFT_RESET,
+    Report,
+    Triple,
+    alarm_text,
+    jog_line,
+)
+from .grbl_session import CommandRefusedError, GrblSession
+from .link import Link, WireLog
+from .ports import resolve_port
+from .presence import Presence
+from .stage import (
+    AlarmError,
+    InterlockError,
+    LinkLostError,
+    PositionLostError,
+    PositionState,
+    StageIdentity,
+    StageLimits,
+    StageStatus,
+    StageTimeoutError,
+    StoppedError,
+)
+from .stage_config import StageConfig
+
+logger = logging.getLogger(__name__)
+
+_MARGIN_S = 5.0
+
+
+class GrblStage:
+    """One axis of a GRBL board.
+
+    Parameters
+    ----------
+    config : StageConfig
+        Table ``[stage]`` of the rig file.
+    clock : Clock
+        Time.
+    log : WireLog, optional
+        Where every byte is recorded.
+    """
+
+    def __init__(
+        self, config: StageConfig, clock: Clock, *, log: WireLog | None = None
+    ) -> None:
+        self._config = config
+        self._clock = clock
+        self._log = log
+        self._axis = "XYZ".index(config.axis)
+        self._link: Link | None = None
+        self._session: GrblSession | None = None
+        self._presence: Presence | None = None
+        self._identity: StageIdentity | None = None
+        self._limits: StageLimits | None = None
+        self._position: PositionState = "unknown"
+        self._restarts = 0
+        self._standing_at: Triple | None = None
+
+    @property
+    def position_state(self) -> PositionState:
+        """How far the position can be trusted."""
+        return self._position
+
+    @property
+    def identity(self) -> StageIdentity:
+        """Who answers, with all settings."""
+        if self._identity is None:
+            raise StageError("the stage is not connected")
+        return self._identity
+
+    @property
+    def limits(self) -> StageLimits:
+        """What the board is set to."""
+        if self._limits is None:
+            raise StageError("the stage is not connected")
+        return self._limits
+
+    def connect(self) -> None:
+        """Open the port, find out who answers, refuse what does not fit.
+
+        Raises
+        ------
+        StageError
+            If the port cannot be opened, nobody answers as GRBL, or a setting does not
+            fit the rig file: the sentence names the setting.
+        """
+        config = self._config
+        self._disconnect()
+        self._position = "unknown"
+        port = resolve_port(config.port)
+        link = Link(
+            port, baud=config.baud, clock=self._clock, log=self._log, dtr=config.dtr
+        )
+        link.open()
+        presence = Presence(port)
+        presence.claim()
+        self._link, self._presence = link, presence
+        session = GrblSession(
+            link, self._clock, answer_timeout_s=config.answer_timeout_s
+        )
+        try:
+            found = connect_board(session, self._clock, config)
+            problem = grbl_audit.audit(found.settings, config)
+            if problem:
+                raise StageError(f"the stage on {port} does not fit: {problem}")
+        except BaseException:
+            self._disconnect()
+            raise
+        self._session = session
+        self._restarts = session.restarts
+        self._limits = grbl_audit.limits_of(found.settings, config)
+        self._identity = StageIdentity(
+            driver="grbl",
+            firmware=found.banner,
+            port=port,
+            details=found.details,
+            settings=found.settings,
+        )
+        left_at = presence.recall()
+        self._standing_at = session.machine()
+        if left_at and found.undisturbed and self._is_at(left_at):
+            self._position = "homed"
+
+    def home(self) -> None:
+        """Run the homing cycle of the board and wait for its end.
+
+        Raises
+        ------
+        AlarmError
+            If a switch was not found, stayed closed, or the cycle was cut off.
+        StageTimeoutError
+            If it does not end in time; the board is reset.
+        """
+        session = self._require_session()
+        if self._config.homing != "switches":
+            raise StageError(
+                'the rig file says homing = "manual": bring the stage to a known gap '
+                "and say which: magbend rig set-gap GAP"
+            )
+        self._make_ready(session)
+        limit_s = self._config.home_timeout_s or self._config.busy_factor * (
+            grbl_audit.homing_time_s(self.identity.settings)
+        )
+        self._position, self._standing_at = "unknown", None
+        with self._stop_if_interrupted():
+            session.drain()
+            self._require_link().write(self._config.home_command.encode() + b"\n")
+            await_homing(
+                session,
+                self._clock,
+                limit_s,
+                command=self._config.home_command,
+                check_stop=lambda: self._raise_if_stop_asked(at_once=True),
+            )
+        report = self._wait_for_report(session)
+        if report.state != "idle":
+            raise StageError(f"after homing the stage is in {report.state}, not idle")
+        session.alarm = None
+        self._restarts = session.restarts
+        self._standing_at = session.machine()
+        self._position = "homed"
+
+    def assume_homed(self, machine_mm: float) -> None:
+        """Take the operator's word that the board's count is `machine_mm`.
+
+        Raises
+        ------
+        StageError
+            If the board counts otherwise: then `gap_at_zero_mm` is what to change.
+        """
+        session = self._require_session()
+        report = self._wait_for_report(session)
+        here = self._machine_mm()
+        if report.state != "idle" or here is None:
+            raise StageError(
+                f"the stage must be idle for this; it is in {report.state}"
+            )
+        if abs(here - machine_mm) > self.limits.step_mm:
+            raise StageError(
+                f"the board counts {here:.3f} mm where the rig file expects "
+                f"{machine_mm:.3f} mm: change stage.gap_at_zero_mm by "
+                f"{self._config.direction * (machine_mm - here):+.3f} mm"
+            )
+        self._standing_at = session.machine()
+        self._position = "homed"
+
+    def move_to(self, machine_mm: float, *, feed_mm_min: float) -> None:
+        """Go there in pieces and return when the stage stands there.
+
+        Raises
+        ------
+        PositionLostError
+            If the stage is not homed, or the board restarted.
+        InterlockError
+            If the target lies outside the travel; nothing was sent.
+        AlarmError, StageTimeoutError, LinkLostError, StoppedError
+            As they say; the stage stands, or finishes one short piece.
+        """
+        session = self._require_session()
+        self._check_travel(machine_mm)
+        self._make_ready(session)
+        self._require_homed(session)
+        here = self._machine_mm()
+        if here is None:
+            raise PositionLostError("the stage does not report its position; home it")
+        distance = machine_mm - here
+        if abs(distance) <= self.limits.step_mm / 2.0:
+            return
+        pieces = math.ceil(abs(distance) / self._config.piece_mm)
+        with self._stop_if_interrupted():
+            for piece in range(1, pieces + 1):
+                target = here + distance * piece / pieces
+                self._move_piece(session, target, feed_mm_min)
+
+    def status(self) -> StageStatus:
+        """Ask the board; no answer is the state ``silent``."""
+        session = self._require_session()
+        report = session.ask()
+        self._notice_restart(session)
+        if report is None:
+            state = "alarm" if session.alarm is not None else "silent"
+            return StageStatus(
+                state=state,  # type: ignore[arg-type]
+                position_state=self._position,
+                alarm=session.alarm,
+            )
+        return StageStatus(
+            state=report.state,  # type: ignore[arg-type]
+            substate=report.substate,
+            machine_mm=self._machine_mm(),
+            position_state=self._position,
+            feed_mm_min=report.feed,
+            alarm=session.alarm,
+            pins=report.pins,
+            raw=report.raw,
+        )
+
+    def stop_requested(self) -> bool:
+        """Return whether another process asks this one to stop the stage."""
+        return self._presence is not None and self._presence.stop_asked()
+
+    def hold(self) -> None:
+        """Feed hold, wait for standstill, forget the rest; the position stays good.
+
+        Raises
+        ------
+        StageTimeoutError
+            If the board does not say that it stands; it is reset, and the position is
+            ``unverified``.
+        """
+        session = self._require_session()
+        session.realtime(FEED_HOLD)
+        if self._presence:
+            self._presence.clear_stop()
+        feed = self.limits.max_feed_mm_min / 60.0
+        limit_s = _MARGIN_S + self._config.busy_factor * (
+            feed / self.limits.acceleration_mm_s2
+        )
+        report = await_stand(session, self._clock, limit_s)
+        if report is not None:
+            if report.state == "hold" or not session.in_step:
+                self._reset_standing(session)
+            self._standing_at = session.machine()
+            return
+        moved = not session.deaf
+        session.reset()
+        if moved and self._position == "homed":
+            self._position = "unverified"
+        raise StageTimeoutError(
+            "the stage did not come to a stop that it could report; it was reset; "
+            "home it (magbend rig home)"
+        )
+
+    def stop(self) -> None:
+        """Soft-reset at once; what was moving has lost steps."""
+        session = self._require_session()
+        moving = session.report is None or not stands(session.report)
+        if moving and self._position == "homed":
+            self._position = "unverified"
+        if self._presence:
+            self._presence.clear_stop()
+        self._reset_standing(session)
+
+    def recover(self) -> None:
+        """Bring the board back: reconnect a lost link, reset an alarmed board.
+
+        The alarm lock stays: home the stage, or unlock it.
+
+        Raises
+        ------
+        StageError
+            If the board does not come back.
+        """
+        if self._link is None or not self._link.is_open:
+            kept = self._position
+            self.connect()
+            if self._position == "homed" or kept != "unknown":
+                self._position = "unverified"
+            return
+        session = self._require_session()
+        report = session.ask()
+        moving = report is not None and not stands(report)
+        if moving:
+            self.hold()
+        elif not session.reset():
+            raise StageTimeoutError("the stage does not answer a reset; cut its power")
+        self._notice_restart(session)
+
+    def unlock(self) -> None:
+        """Send ``$X``; the position is ``homed`` only if the alarm kept it."""
+        session = self._require_session()
+        code = session.alarm
+        if session.deaf or not session.in_step:
+            session.reset()
+        session.command("$X")
+        session.alarm, session.locked_message = None, False
+        kept = code is not None and alarm_text(code).position_kept
+        if self._position == "homed" and not kept:
+            self._position = "unverified"
+
+    def close(self) -> None:
+        """Let go of the port; where a homed stage stands is remembered."""
+        session, presence = self._session, self._presence
+        if session and presence and self._link and self._link.is_open:
+            with contextlib.suppress(StageError):
+                report = session.ask()
+                self._notice_restart(session)
+                machine = session.machine()
+                idle = report is not None and report.state == "idle"
+                if self._position == "homed" and idle and machine:
+                    presence.remember(machine)
+        self._disconnect()
+
+    def _move_piece(
+        self, session: GrblSession, target_mm: float, feed_mm_min: float
+    ) -> None:
+        start = self._machine_mm()
+        distance = abs(target_mm - start) if start is not None else 0.0
+        limit_s = _MARGIN_S + self._config.busy_factor * self.limits.duration_s(
+            distance, feed_mm_min
+        )
+        target = Target(
+            axis=self._axis,
+            machine_mm=target_mm,
+            tolerance_mm=1.01 * self.limits.step_mm,
+            limit_s=limit_s,
+        )
+        restarts = session.restarts
+        try:
+            session.command(jog_line(self._config.axis, target_mm, feed_mm_min))
+            await_arrival(
+                session,
+                self._clock,
+                target,
+                restarts=restarts,
+                check_stop=self._raise_if_stop_asked,
+            )
+        except CommandRefusedError as error:
+            if error.code == "15":
+                raise InterlockError(
+                    f"the board refuses {target_mm:.3f} mm: it lies outside the travel "
+                    "it is set to; nothing moved"
+                ) from None
+            raise
+        except AlarmError as error:
+            self._position = "homed" if error.position_kept else "unknown"
+            session.reset()
+            raise
+        except PositionLostError:
+            self._position, self._restarts = "unknown", session.restarts
+            raise
+        except LinkLostError:
+            self._position = "unverified"
+            raise
+        except StageTimeoutError as error:
+            self._give_up(error)
+        self._standing_at = session.machine()
+
+    def _give_up(self, error: StageTimeoutError) -> None:
+        """Bring the stage to a stand after a timeout, and say so."""
+        with contextlib.suppress(StageError):
+            self.hold()
+        if self._position == "homed":
+            self._position = "unverified"
+        session = self._session
+        if session is not None and not session.in_step:
+            with contextlib.suppress(StageError):
+                session.reset()
+        raise StageTimeoutError(
+            f"{error}; the stage was stopped and its position is unverified: home it"
+        ) from None
+
+    def _raise_if_stop_asked(self, *, at_once: bool = False) -> None:
+        if not self.stop_requested():
+            return
+        if at_once:
+            self.stop()
+        else:
+            self.hold()
+        raise StoppedError("the stage was stopped by magbend rig stop")
+
+    @contextlib.contextmanager
+    def _stop_if_interrupted(self) -> Iterator[None]:
+        """On Ctrl-C: hold first, so that the position stays; a second one resets."""
+        try:
+            yield
+        except KeyboardInterrupt:
+            session = self._require_session()
+            homing = session.report is not None and self._position == "unknown"
+            try:
+                if homing:
+                    self.stop()
+                else:
+                    self.hold()
+            except KeyboardInterrupt:
+                with contextlib.suppress(StageError):
+                    session.realtime(SOFT_RESET)
+                self._position = "unverified"
+            except StageError as error:
+                logger.warning("stage: %s", error)
+            raise
+
+    def _make_ready(self, session: GrblSession) -> None:
+        """Bring the board to where it takes a line: standing, in step, not deaf."""
+        report = self._wait_for_report(session)
+        self._notice_restart(session)
+        stuck = report.state == "home"  # a running cycle answers no question
+        if not (stands(report) or stuck):
+            raise StageError(
+                f"the stage is in {report.state}; wait for it, or stop it first "
+                "(magbend rig stop)"
+            )
+        if report.state == "sleep" and self._position == "homed":
+            self._position = "unverified"  # its motors had been off
+        waits = stuck or report.state in ("hold", "sleep")
+        if waits or session.deaf or not session.in_step:
+            self._reset_standing(session)
+        if report.state == "check":
+            raise StageError("the board is in check mode ($C); type $C to leave it")
+
+    def _wait_for_report(self, session: GrblSession) -> Report:
+        for _ in range(3):
+            report = session.ask(self._config.answer_timeout_s)
+            if report is not None:
+                return report
+            if session.deaf:
+                session.reset()
+        if session.reset() and session.report is not None:
+            if self._position == "homed":
+                self._position = "unverified"
+            return session.report
+        raise StageTimeoutError("the stage does not answer; look at cable and power")
+
+    def _reset_standing(self, session: GrblSession) -> None:
+        if not session.reset():
+            if self._position == "homed":
+                self._position = "unverified"
+            raise StageTimeoutError("the stage does not answer a reset; cut its power")
+        self._distrust_after_alarm(session)
+
+    def _distrust_after_alarm(self, session: GrblSession) -> None:
+        alarm = session.alarm
+        if alarm is not None and not alarm_text(alarm).position_kept:
+            self._position = "unknown"
+
+    def _require_homed(self, session: GrblSession) -> None:
+        if session.report and session.report.state == "alarm":
+            code = session.alarm
+            if code is not None:
+                raise session.alarm_error(code)
+            raise PositionLostError(
+                "the board is locked (Alarm); home it (magbend rig home)"
+            )
+        if self._position == "homed" and self._standing_at is not None:
+            now = session.machine()
+            if now is not None and not self._is_at(self._standing_at):
+                self._position = "unknown"
+                raise PositionLostError(
+                    f"the board counts {now[self._axis]:.3f} mm where it had stood at "
+                    f"{self._standing_at[self._axis]:.3f} mm: it restarted, or another "
+                    "program moved it; home it (magbend rig home)"
+                )
+        if self._position != "homed":
+            raise PositionLostError(
+                f"the position of the stage is {self._position}; home it first "
+                "(magbend rig home), then move"
+            )
+        if session.report and self._config.axis in session.report.pins:
+            raise PositionLostError(
+                f"the limit switch of {self._config.axis} is closed (Pn:"
+                f"{session.report.pins}); free it and home the stage"
+            )
+
+    def _notice_restart(self, session: GrblSession) -> None:
+        if session.restarts != self._restarts:
+            self._restarts = session.restarts
+            self._position, self._standing_at = "unknown", None
+        self._distrust_after_alarm(session)
+
+    def _check_travel(self, machine_mm: float) -> None:
+        travel = self.limits.travel_mm
+        slack = self.limits.step_mm / 2.0
+        if travel and not travel[0] - slack <= machine_mm <= travel[1] + slack:
+            raise InterlockError(
+                f"machine position must be from {travel[0]:g} to {travel[1]:g} mm; "
+                f"instead received {machine_mm:g} mm; nothing was sent"
+            )
+
+    def _machine_mm(self) -> float | None:
+        machine = self._session.machine() if self._session else None
+        return machine[self._axis] if machine and len(machine) > self._axis else None
+
+    def _is_at(self, place: Triple) -> bool:
+        now = self._session.machine() if self._session else None
+        if now is None or len(now) != len(place):
+            return False
+        slack = 1.5 * self.limits.step_mm
+        return all(abs(a - b) <= slack for a, b in zip(now, place, strict=True))
+
+    def _require_session(self) -> GrblSession:
+        if self._session is None:
+            raise StageError("the stage is not connected")
+        return self._session
+
+    def _require_link(self) -> Link:
+        if self._link is None:
+            raise StageError("the stage is not connected")
+        return self._link
+
+    def _disconnect(self) -> None:
+        if self._link:
+            self._link.close()
+        if self._presence:
+            self._presence.release()
+        self._link = self._session = self._presence = None

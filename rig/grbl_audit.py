@@ -1,0 +1,122 @@
+"""Does the board's ``$$`` fit the rig file? Pure: settings in, a sentence out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from .stage import StageLimits
+from .stage_config import StageConfig
+
+Settings = Mapping[str, str]
+
+_AXES = "XYZ"
+
+
+def number(settings: Settings, name: str) -> float | None:
+    """Return a setting as a number, or None if it is missing or is none."""
+    try:
+        value = float(settings[name])
+    except (KeyError, ValueError):
+        return None
+    return value if math.isfinite(value) else None
+
+
+def audit(settings: Settings, config: StageConfig) -> str | None:
+    """Return why the board does not fit the rig file, or None if it does.
+
+    Parameters
+    ----------
+    settings : mapping
+        ``$`` numbers without the dollar sign to values as text.
+    config : StageConfig
+        Table ``[stage]`` of the rig file.
+    """
+    for name, meaning, wanted in _expected(config):
+        found = number(settings, name)
+        if found is None:
+            return f"the board does not report ${name} ({meaning})"
+        if wanted is None:
+            if found <= 0.0:
+                return (
+                    f"${name} ({meaning}) is {found:g}; it must be above zero: type "
+                    f"${name}=... on the board's console, then connect again"
+                )
+        elif not math.isclose(found, wanted, rel_tol=1e-6, abs_tol=1e-9):
+            return (
+                f"${name} ({meaning}) is {found:g}, the rig file says {wanted:g}: type "
+                f"${name}={wanted:g} on the board's console, or correct the rig file"
+            )
+    return _audit_flags(settings, config)
+
+
+def _expected(config: StageConfig) -> list[tuple[str, str, float | None]]:
+    """List settings to look at: number, meaning, value wanted (None: above zero)."""
+    axis, index = config.axis, _AXES.index(config.axis)
+    rows: list[tuple[str, str, float | None]] = [
+        (f"{100 + index}", f"steps/mm of {axis}", config.steps_per_mm),
+        (f"{110 + index}", f"max. rate of {axis} in mm/min", config.max_feed_mm_min),
+        (f"{120 + index}", f"acceleration of {axis} in mm/s2",
+         config.acceleration_mm_s2),
+        (f"{130 + index}", f"max. travel of {axis} in mm", config.travel_mm),
+    ]  # fmt: skip
+    named = [
+        (name.lstrip("$"), "listed in the rig file", value)
+        for name, value in config.settings.items()
+    ]
+    return rows + named
+
+
+def _audit_flags(settings: Settings, config: StageConfig) -> str | None:
+    if number(settings, "13"):
+        return "$13 (report in inches) is 1; type $13=0 on the board's console"
+    feed = number(settings, f"{110 + _AXES.index(config.axis)}")
+    if feed is not None and config.feed_mm_min > feed:
+        return (
+            f"$11{_AXES.index(config.axis)} (max. rate of {config.axis}) is {feed:g} "
+            f"mm/min, below stage.feed_mm_min = {config.feed_mm_min:g} of the rig file"
+        )
+    homing = number(settings, "22")
+    if config.homing == "switches" and not (homing and int(homing) & 1):
+        return (
+            "$22 (homing) is off, so the stage cannot find its position: type $22=1 on "
+            "the board's console (limit switches on every axis of a stock build), or "
+            'write homing = "manual" in the rig file and use magbend rig set-gap'
+        )
+    return None
+
+
+def limits_of(settings: Settings, config: StageConfig) -> StageLimits:
+    """Return step, ceilings and travel of the axis, after the audit passed.
+
+    A GRBL that homes by switches counts from 0 at the switches into the negative:
+    its travel is from -$130 to 0.
+    """
+    index = _AXES.index(config.axis)
+    steps, feed, acceleration, travel = (
+        number(settings, f"{base + index}") or math.nan for base in (100, 110, 120, 130)
+    )
+    homed_by_switches = config.homing == "switches"
+    return StageLimits(
+        step_mm=1.0 / steps,
+        max_feed_mm_min=feed,
+        acceleration_mm_s2=acceleration,
+        travel_mm=(-travel, 0.0) if homed_by_switches else None,
+    )
+
+
+def homing_time_s(settings: Settings) -> float:
+    """Return an upper bound of how long ``$H`` takes, in s.
+
+    Search over 1.5 x the longest travel, then twice the pull-off and a slow locate
+    over 5 x the pull-off, for the two groups (Z, then X and Y) of a stock build.
+    """
+    seek = (number(settings, "25") or 500.0) / 60.0
+    locate = (number(settings, "24") or 25.0) / 60.0
+    pull_off = number(settings, "27") or 1.0
+    pause = 4.0 * (number(settings, "26") or 250.0) / 1000.0
+    travel = max(number(settings, f"{name}") or 200.0 for name in (130, 131, 132))
+    slowest = min(number(settings, f"{name}") or 10.0 for name in (120, 121, 122))
+    ramps = 4.0 * seek / slowest
+    group = 1.5 * travel / seek + 5.0 * pull_off / locate + 2.0 * pull_off / seek
+    return 2.0 * (group + ramps + pause)

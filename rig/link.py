@@ -1,0 +1,273 @@
+"""A serial line to a controller: one owner, whole lines, every byte on record.
+
+The thread that opens the port owns it: only it may read and write lines. Real-time
+bytes (feed hold, soft reset) may come from any thread, since one byte cannot be torn.
+Time is the clock's, so that the same code runs on hardware and on the twin.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from pathlib import Path
+from typing import Any, TextIO
+
+from ..core.errors import StageError
+from .clock import Clock
+from .stage import LinkLostError
+
+_SLICE_S = 0.02
+_MAX_LINE = 4096
+
+
+class WireLog:
+    """A text file of every byte to and from the devices, with times.
+
+    Each row is ``monotonic_s utc device direction bytes``; direction is ``>>`` to the
+    device, ``<<`` from it and ``--`` a remark; bytes are a Python literal.
+
+    Parameters
+    ----------
+    path : Path
+        Where to append.
+    clock : Clock
+        Source of both times.
+    """
+
+    def __init__(self, path: Path, clock: Clock) -> None:
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._file: TextIO = path.open("a", encoding="utf-8", buffering=1)
+
+    def record(self, device: str, direction: str, data: bytes | str) -> None:
+        """Append one row; a closed or full log never stops the stage."""
+        utc = self._clock.utc().isoformat(timespec="milliseconds")
+        what = data if isinstance(data, str) else repr(data)
+        row = f"{self._clock.monotonic_s():.3f} {utc} {device} {direction} {what}\n"
+        with self._lock, contextlib.suppress(OSError, ValueError):
+            self._file.write(row)
+
+    def close(self) -> None:
+        """Close the file."""
+        with self._lock, contextlib.suppress(OSError):
+            self._file.close()
+
+
+class Link:
+    """One open serial port that speaks lines.
+
+    Parameters
+    ----------
+    port : str
+        Device name or pyserial URL.
+    baud : int
+        Speed.
+    clock : Clock
+        Time for all waits.
+    log : WireLog, optional
+        Where every byte is recorded.
+    device : str
+        Name in the log.
+    dtr : bool or None
+        Level of DTR on opening; None leaves it to the system. Many boards restart
+        when it changes.
+    """
+
+    def __init__(
+        self,
+        port: str,
+        *,
+        baud: int,
+        clock: Clock,
+        log: WireLog | None = None,
+        device: str = "stage",
+        dtr: bool | None = None,
+    ) -> None:
+        self.port = port
+        self._baud = baud
+        self._clock = clock
+        self._log = log
+        self._device = device
+        self._dtr = dtr
+        self._serial: Any = None
+        self._owner = 0
+        self._buffer = bytearray()
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the port is open."""
+        return self._serial is not None
+
+    def open(self) -> None:
+        """Open the port for this thread alone.
+
+        Raises
+        ------
+        StageError
+            If there is no such port, or another program holds it.
+        """
+        import serial
+
+        from .virtual import register_twin_urls
+
+        register_twin_urls()
+        try:
+            options: dict[str, Any] = {"do_not_open": True, "timeout": _SLICE_S}
+            port = serial.serial_for_url(
+                self.port, self._baud, write_timeout=2.0, exclusive=True, **options
+            )
+            if self._dtr is not None:
+                port.dtr = self._dtr
+            port.open()
+        except (OSError, ValueError) as error:
+            raise StageError(_why_not_open(self.port, error)) from None
+        self._serial = port
+        self._owner = threading.get_ident()
+        self._buffer.clear()
+        self._remark(f"opened {self.port} at {self._baud}")
+
+    def write(self, data: bytes) -> None:
+        """Send bytes; only the owner may.
+
+        Raises
+        ------
+        LinkLostError
+            If the device is gone.
+        StageError
+            If another thread than the owner calls.
+        """
+        self._require_owner()
+        self._send(data)
+
+    def write_realtime(self, byte: bytes) -> None:
+        """Send one real-time byte, from any thread.
+
+        Raises
+        ------
+        LinkLostError
+            If the device is gone.
+        """
+        self._send(byte)
+
+    def read_line(self, timeout_s: float) -> str | None:
+        """Return the next whole line without its end, or None when time is up.
+
+        A line that has not ended stays in the buffer; empty lines are skipped.
+
+        Raises
+        ------
+        LinkLostError
+            If the device is gone.
+        """
+        self._require_owner()
+        deadline_s = self._clock.monotonic_s() + timeout_s
+        while True:
+            line = self._take_line()
+            if line is not None:
+                return line
+            if not self._receive() and self._clock.monotonic_s() >= deadline_s:
+                return None
+
+    def waiting_line(self) -> str | None:
+        """Return a line that is already here, or None at once.
+
+        Raises
+        ------
+        LinkLostError
+            If the device is gone.
+        """
+        self._require_owner()
+        line = self._take_line()
+        if line is None and self._waiting() and self._receive():
+            line = self._take_line()
+        return line
+
+    def close(self) -> None:
+        """Close the port; never raises."""
+        port, self._serial = self._serial, None
+        if port is not None:
+            with contextlib.suppress(OSError):
+                port.close()
+            self._remark(f"closed {self.port}")
+
+    def _send(self, data: bytes) -> None:
+        port = self._require_open()
+        if self._log:
+            self._log.record(self._device, ">>", data)
+        try:
+            port.write(data)
+        except OSError as error:  # SerialException is one
+            raise self._lost(error) from None
+
+    def _receive(self) -> bool:
+        port = self._require_open()
+        try:
+            data = port.read(max(1, port.in_waiting))
+        except (OSError, TypeError) as error:  # TypeError: closed in the middle
+            raise self._lost(error) from None
+        if data and self._log:
+            for piece in data.splitlines(keepends=True):
+                self._log.record(self._device, "<<", piece)
+        self._buffer += data
+        return bool(data)
+
+    def _waiting(self) -> bool:
+        try:
+            return bool(self._require_open().in_waiting)
+        except (OSError, TypeError) as error:
+            raise self._lost(error) from None
+
+    def _take_line(self) -> str | None:
+        while True:
+            end = self._buffer.find(b"\n")
+            if end < 0:
+                if len(self._buffer) > _MAX_LINE:
+                    self._buffer.clear()
+                return None
+            line = bytes(self._buffer[:end]).strip(b"\r\0 ")
+            del self._buffer[: end + 1]
+            if line:
+                return line.decode("latin-1")
+
+    def _lost(self, error: Exception) -> LinkLostError:
+        self._remark(f"link lost: {error}")
+        self.close()
+        return LinkLostError(
+            f"link lost: the stage on {self.port} is gone; it finishes the move it had "
+            "been sent and stops; plug it in, then reconnect and home it"
+        )
+
+    def _require_open(self) -> Any:
+        if self._serial is None:
+            raise LinkLostError(f"link lost: the port {self.port} is not open")
+        return self._serial
+
+    def _require_owner(self) -> None:
+        if self._serial is not None and threading.get_ident() != self._owner:
+            raise StageError(
+                f"the port {self.port} belongs to the thread that opened it; "
+                "another thread may only send real-time bytes"
+            )
+
+    def _remark(self, text: str) -> None:
+        if self._log:
+            self._log.record(self._device, "--", text)
+
+
+def _why_not_open(port: str, error: Exception) -> str:
+    text = str(error)
+    busy = ("exclusively lock", "Access is denied", "busy", "temporarily unavailable")
+    if any(word in text for word in busy):
+        return (
+            f"the port {port} is in use by another program; close that program, or "
+            "stop it with: magbend rig stop"
+        )
+    if isinstance(error, PermissionError) or "Permission denied" in text:
+        return (
+            f"the port {port} may not be opened by this user; on Linux add the user "
+            "to the group dialout and log in again"
+        )
+    return (
+        f"the port {port} cannot be opened: {text}; "
+        "magbend rig ports lists what is there"
+    )
