@@ -13,21 +13,26 @@ modulus and remanence enter only as their ratio: asking for both names both.
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from .. import sim
-from ..core.errors import InputError, SolverError
+from ..core.errors import InputError, MagbendError, SolverError
+from ..core.files import write_text
 from ..core.specimen import Specimen
 from .fit_problem import WALL, Nuisance, Problem, build_problem, residuals
 from .load import RunData
+
+if TYPE_CHECKING:
+    from .posterior import Posterior
 
 Array = NDArray[np.float64]
 
@@ -70,6 +75,10 @@ class FitResult:
         The nominal specimen with the fitted moduli (nominal where unknown).
     covariance : ndarray, shape (p, p)
         Of the logarithms of the unknowns asked for.
+    unknowns : ndarray, shape (p + q,)
+        Where the search ended, in the dimensionless unknowns of `residuals`.
+    problem : Problem
+        What was fitted.
     skipped : tuple of str
         Steps that could not be used, and why.
     """
@@ -90,6 +99,7 @@ class FitResult:
     specimen: Specimen
     covariance: Array
     unknowns: Array
+    problem: Problem
     model: str
     steps: int
     skipped: tuple[str, ...]
@@ -303,6 +313,7 @@ def _result(problem: Problem, prior: Array, unknowns: Array, model: str) -> FitR
         specimen=_fitted_specimen(problem, value),
         covariance=covariance,
         unknowns=unknowns,
+        problem=problem,
         model=model,
         steps=len(problem.shots),
         skipped=problem.skipped,
@@ -405,8 +416,6 @@ def _residual_rows(
 
 
 def _fitted_specimen(problem: Problem, values: Array) -> Specimen:
-    from dataclasses import replace
-
     sections = tuple(
         replace(section, E_MPa=float(value)) if math.isfinite(value) else section
         for section, value in zip(problem.specimen.sections, values, strict=False)
@@ -414,19 +423,29 @@ def _fitted_specimen(problem: Problem, values: Array) -> Specimen:
     return replace(problem.specimen, sections=sections)
 
 
-def write_fit(path: Path, result: FitResult) -> None:
+def try_fit(run: RunData, support: sim.Support | None = None) -> FitResult | str:
+    """Fit one run by itself, or return the sentence that says why not."""
+    try:
+        return fit_runs([run], support=support)
+    except MagbendError as error:
+        return str(error)
+
+
+def write_fit(
+    path: Path, result: FitResult, posterior: Posterior | None = None
+) -> None:
     """Write ``fit.json``; null stands for a number that is not known."""
-    import json
+    data = result.as_dict()
+    if posterior is not None:
+        data["posterior"] = posterior.as_dict()
+    write_text(path, json.dumps(_plain(data), indent=2, allow_nan=False) + "\n")
 
-    from ..core.files import write_text
 
-    def plain(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {key: plain(item) for key, item in value.items()}
-        if isinstance(value, list | tuple):
-            return [plain(item) for item in value]
-        if isinstance(value, float) and not math.isfinite(value):
-            return None
-        return value
-
-    write_text(path, json.dumps(plain(result.as_dict()), indent=2) + "\n")
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from . import analysis_model
+from . import analysis_model, analysis_runs
 from .console import group
 
 app = group(
@@ -11,4 +11,5 @@ app = group(
     "magbend analysis report runs/gmc2",
 )
 
+analysis_runs.register(app)
 analysis_model.register(app)

@@ -64,7 +64,7 @@ def write_report(
     runs: Sequence[RunComparison],
     out: Path,
     *,
-    fits: Sequence[FitResult | None] | None = None,
+    fits: Sequence[FitResult | str | None] | None = None,
     title: str = "",
     by_number: dict[int, RunComparison] | None = None,
     extra_html: Sequence[tuple[str, str]] = (),
@@ -78,8 +78,8 @@ def write_report(
         From `compare_run`; failed frames are shown as failed.
     out : Path
         The HTML file; PDFs go into ``figures/`` beside it.
-    fits : sequence of FitResult or None, optional
-        One a run, None where there is none.
+    fits : sequence of FitResult, str or None, optional
+        One a run; a sentence says why there is none, None leaves the section out.
     title : str
         Of the page; made up from the runs if empty.
     by_number : dict of int to RunComparison, optional
@@ -162,7 +162,7 @@ def number(value: Any, digits: int = 3) -> str:
 
 def _section(
     run: RunComparison,
-    fit: FitResult | None,
+    fit: FitResult | str | None,
     index: int,
     prefix: str,
     drawing: _Drawing,
@@ -177,6 +177,7 @@ def _section(
         else (lambda _name, _make: "")
     )
     compared = any(c.ok for c in run.comparisons)
+    fitted = fit if isinstance(fit, FitResult) else None
     return {
         "id": f"run-{index}",
         "label": run.run.label,
@@ -193,11 +194,12 @@ def _section(
         "field": draw("field", lambda: figures.field_figure(run)),
         "magnet_fit": run.magnet_fit,
         "magnet": run.magnet,
-        "fit": _fit_context(fit),
+        "fit": _fit_context(fitted),
+        "no_fit": fit if isinstance(fit, str) else "",
         "fit_figure": draw(
-            "fit", lambda: figures.fit_figure(fit) if fit is not None else None
+            "fit", lambda: figures.fit_figure(fitted) if fitted is not None else None
         ),
-        "budget": _budget(run, fit) if full else [],
+        "budget": _budget(run, fitted) if full else [],
         "provenance": _provenance(run),
         "full": full,
     }

@@ -115,7 +115,7 @@ def residual_figure(run: RunComparison) -> Figure:
         for joint in run.run.specimen.joints_mm:
             for axes in (left, right):
                 axes.axvline(joint, color=FAINT, linewidth=0.6, dashes=(1, 2))
-        right.set_title("b  curvature: points measured, line simulated (magnet)")
+        right.set_title("b  curvature: measured (points), magnet (line)")
         right.set_xlabel("s from the clamp (mm)")
         right.set_ylabel("curvature (1/mm)")
     return figure
@@ -173,7 +173,7 @@ def field_figure(run: RunComparison) -> Figure | None:
         left.set_ylabel("flux density (mT)")
         left.legend()
         right.axhline(0.0, color=FAINT, linewidth=0.8)
-        right.set_title("b  reading minus cube")
+        right.set_title("b  cube minus reading")
         right.set_xlabel("gap from the N face (mm)")
         right.set_ylabel("difference (%)")
     return figure

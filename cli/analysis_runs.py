@@ -1,0 +1,442 @@
+"""``magbend analysis compare|fit|report|export|paper|audit|probe``: runs and theory."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from ..core.errors import InputError
+from .console import print_json, progress
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from ..analysis.compare import RunComparison
+    from ..analysis.fit import FitResult
+    from ..analysis.load import RunData
+    from ..sim import Support
+
+_RUNS = typer.Argument(..., help="Run folders, or folders of runs.")
+_JSON = typer.Option(False, "--json", help="Print JSON for a machine.")
+_CLAMP = typer.Option(0.0, "--clamp-angle-deg", help="Direction of the clamp.")
+_GRAVITY = typer.Option(
+    None,
+    "--gravity-m-s2",
+    help="Weight x y z in the specimen frame; 0 0 -9.81 is a bench seen from above.",
+)
+_LOAD = typer.Option(1.0, "--load-factor", help="Factor on the magnetic load.")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the group."""
+    for command, example in (
+        (compare, "magbend analysis compare runs/gmc2"),
+        (fit, "magbend analysis fit runs/gmc2 --json"),
+        (report, "magbend analysis report runs/gmc2"),
+        (export, "magbend analysis export runs/gmc2 --out gmc2.mat"),
+        (paper, "magbend analysis paper --out paper"),
+        (audit, "magbend analysis audit"),
+        (probe, "magbend analysis probe --reading-mT 20.07 --side-mm 1.0"),
+    ):
+        app.command(epilog=f"Example: {example}")(command)
+
+
+def compare(
+    runs: list[Path] = _RUNS,
+    out: Path = typer.Option(
+        None, "--out", help="One table of all runs, besides RUN/comparison.csv."
+    ),
+    model: str = typer.Option("rod", "--model", help="rod or solid."),
+    clamp_angle_deg: float = _CLAMP,
+    gravity_m_s2: tuple[float, float, float] = _GRAVITY,
+    load_factor: float = _LOAD,
+    json: bool = _JSON,
+) -> None:
+    """Compare measured with simulated centrelines; write comparison.csv."""
+    from ..analysis.compare import check_any, comparison_table, write_comparison
+
+    support = _support(clamp_angle_deg, gravity_m_s2, load_factor)
+    done = _compared(runs, support, model)
+    for run in done:
+        write_comparison(run.run.path / "comparison.csv", [run])
+    if out is not None:
+        write_comparison(out, done)
+    table = comparison_table(done)
+    if json:
+        print_json(table.to_dict("records"))
+    else:
+        _print_comparison(table, done)
+    check_any(done)
+
+
+def fit(
+    runs: list[Path] = _RUNS,
+    out: Path = typer.Option(
+        None, "--out", help="fit.json; in the first run folder if not given."
+    ),
+    field: str = typer.Option("magnet", "--field", help="magnet or uniform."),
+    free: list[str] = typer.Option(
+        [],
+        "--free",
+        help="Also fit remanence_mT, load_factor or magnet_remanence_T; repeatable.",
+    ),
+    hold: list[str] = typer.Option(
+        [],
+        "--hold",
+        help="Hold a nuisance: clamp_angle_deg, clamp_position_mm, frame_angle_deg, "
+        "scale_percent, magnet_percent, weight_percent, or all; repeatable.",
+    ),
+    prior: list[str] = typer.Option(
+        [], "--prior", help="Prior sd of a nuisance: NAME=SD; repeatable."
+    ),
+    range_MPa: tuple[float, float] = typer.Option(
+        None, "--prior-range-MPa", help="95 % prior range of a modulus (paper: 8 50)."
+    ),
+    bounds_MPa: tuple[float, float] = typer.Option(
+        None, "--bounds-MPa", help="Hard bounds of the moduli."
+    ),
+    falling: bool = typer.Option(
+        False, "--falling", help="Moduli must fall from root to tip."
+    ),
+    probe_standoff_mm: float = typer.Option(
+        None,
+        "--probe-standoff-mm",
+        help="Take the specimen's remanence as a probe reading at this stand-off.",
+    ),
+    posterior: int = typer.Option(
+        0, "--posterior", help="Also sample the posterior: steps per walker (emcee)."
+    ),
+    seed: int = typer.Option(0, "--seed", help="Of the posterior's walkers."),
+    clamp_angle_deg: float = _CLAMP,
+    gravity_m_s2: tuple[float, float, float] = _GRAVITY,
+    load_factor: float = _LOAD,
+    json: bool = _JSON,
+) -> None:
+    """Fit the moduli with uncertainties; write fit.json."""
+    from ..analysis.fit import fit_runs, write_fit
+    from ..analysis.posterior import sample_posterior
+    from ..analysis.probe import from_probe_reading
+
+    loaded = _loaded(runs)
+    if probe_standoff_mm is not None:
+        loaded = [from_probe_reading(run, probe_standoff_mm) for run in loaded]
+    result = fit_runs(
+        loaded,
+        model=_choice(field, ("magnet", "uniform"), "--field"),
+        free=free,
+        nuisance=_nuisance(hold, prior),
+        support=_support(clamp_angle_deg, gravity_m_s2, load_factor),
+        prior_MPa=range_MPa,
+        bounds_MPa=bounds_MPa,
+        falling=falling,
+    )
+    sampled = None
+    if posterior:
+        with progress("posterior") as tell:
+            sampled = sample_posterior(
+                result, steps=posterior, seed=seed, progress=tell
+            )
+    path = out or loaded[0].path / "fit.json"
+    write_fit(path, result, sampled)
+    data = result.as_dict()
+    if sampled is not None:
+        data["posterior"] = sampled.as_dict()
+    if json:
+        print_json(data)
+    else:
+        _print_fit(result, path, data.get("posterior"))
+
+
+def report(
+    runs: list[Path] = _RUNS,
+    out: Path = typer.Option(
+        None, "--out", help="The page; RUN/report.html or report.html if not given."
+    ),
+    title: str = typer.Option("", "--title", help="Title of the page."),
+    no_fit: bool = typer.Option(False, "--no-fit", help="Leave the fit out."),
+    model: str = typer.Option("rod", "--model", help="rod or solid."),
+    clamp_angle_deg: float = _CLAMP,
+    gravity_m_s2: tuple[float, float, float] = _GRAVITY,
+    load_factor: float = _LOAD,
+    json: bool = _JSON,
+) -> None:
+    """Write one self-contained HTML page, with the figures as PDF beside it."""
+    from ..analysis.compare import write_comparison
+    from ..analysis.fit import try_fit
+    from ..analysis.paper import gmc_numbers
+    from ..analysis.report import write_report
+
+    support = _support(clamp_angle_deg, gravity_m_s2, load_factor)
+    done = _compared(runs, support, model)
+    fits = [None if no_fit else try_fit(run.run, support) for run in done]
+    path = out or (
+        done[0].run.path / "report.html" if len(done) == 1 else Path("report.html")
+    )
+    with progress("report") as tell:
+        files = write_report(
+            done,
+            path,
+            fits=fits,
+            title=title,
+            by_number=gmc_numbers(done),
+            progress=tell,
+        )
+    for run in done:
+        write_comparison(run.run.path / "comparison.csv", [run])
+    failed = [c for run in done for c in run.of("magnet") if not c.ok]
+    if json:
+        print_json(
+            {
+                "html": str(files.html),
+                "figures": [str(path) for path in files.figures],
+                "runs": len(done),
+                "failed_steps": len(failed),
+            }
+        )
+        return
+    for comparison in failed:
+        typer.echo(
+            f"{comparison.run}, step {comparison.step.index}: {comparison.status}",
+            err=True,
+        )
+    typer.echo(str(files.html))
+
+
+def export(
+    runs: list[Path] = _RUNS,
+    out: Path = typer.Option(
+        ...,
+        "--out",
+        help="NAME.mat, NAME.parquet, NAME.csv, or a folder for all three.",
+    ),
+) -> None:
+    """Export points, steps and comparisons as CSV, Parquet or MATLAB .mat."""
+    from ..analysis.export import export_runs
+
+    done = _compared(runs, _support(0.0, None, 1.0), "rod")
+    for path in export_runs(done, out):
+        typer.echo(str(path))
+
+
+def paper(
+    out: Path = typer.Option(Path("paper"), "--out", help="Folder for the runs."),
+    seed: int = typer.Option(1, "--seed", help="Of the twin's hidden truth."),
+    json: bool = _JSON,
+) -> None:
+    """Run the paper's seven GMCs at three fields on the twin bench, and report."""
+    from ..analysis.paper import reproduce
+
+    with progress("paper") as tell:
+        result = reproduce(out, seed=seed, progress=tell)
+    if json:
+        print_json(result.as_dict())
+        return
+    typer.echo(result.sentence())
+    typer.echo(str(result.html))
+
+
+def audit(
+    out: Path = typer.Option(None, "--out", help="Also write the page as HTML."),
+    json: bool = _JSON,
+) -> None:
+    """Check the paper's own numbers; one verdict each, computed here."""
+    from ..analysis.audit import audit_paper, write_audit
+
+    findings = audit_paper()
+    if out is not None:
+        write_audit(out, findings)
+    if json:
+        print_json([finding.as_dict() for finding in findings])
+        return
+    for finding in findings:
+        typer.echo(f"{finding.verdict.upper():12} {finding.claim}")
+        typer.echo(f"{'':12} {finding.evidence}\n")
+
+
+def probe(
+    readings: Path = typer.Argument(
+        None, help="CSV with side_mm, reading_mT[, length_mm]; the paper's if none."
+    ),
+    reading_mT: float = typer.Option(None, "--reading-mT", help="One reading."),
+    side_mm: float = typer.Option(None, "--side-mm", help="Side of its rod."),
+    standoff_mm: float = typer.Option(
+        None, "--standoff-mm", help="Stand-off; fitted to the paper's if not given."
+    ),
+    length_mm: float = typer.Option(30.0, "--length-mm", help="Length of its rod."),
+    json: bool = _JSON,
+) -> None:
+    """Turn readings of a surface probe into remanences, by the stand-off."""
+    from ..analysis.probe import fit_standoff, read_probe_csv, remanence_from_probe_mT
+
+    if (reading_mT is None) != (side_mm is None):
+        raise InputError("give --reading-mT and --side-mm together, or neither")
+    found = fit_standoff(*read_probe_csv(readings))
+    if reading_mT is not None and side_mm is not None:
+        standoff = found.standoff_mm if standoff_mm is None else standoff_mm
+        remanence = remanence_from_probe_mT(
+            reading_mT, side_mm=side_mm, length_mm=length_mm, standoff_mm=standoff
+        )
+        if json:
+            print_json({"remanence_mT": remanence, "standoff_mm": standoff})
+        else:
+            typer.echo(
+                f"remanence {remanence:.2f} mT at a stand-off of {standoff:.3f} mm"
+            )
+        return
+    if json:
+        print_json(found.as_dict())
+        return
+    for line in found.lines():
+        typer.echo(line)
+
+
+def _loaded(paths: Sequence[Path]) -> list[RunData]:
+    from ..analysis.load import find_runs, load_run
+
+    return [load_run(path) for path in find_runs(paths)]
+
+
+def _compared(
+    paths: Sequence[Path], support: Support, model: str
+) -> list[RunComparison]:
+    from ..analysis.compare import compare_run
+
+    _choice(model, ("rod", "solid"), "--model")
+    loaded = _loaded(paths)
+    if len(loaded) < 5:
+        return [compare_run(run, support=support, model=model) for run in loaded]
+    done = []
+    with progress("compare") as tell:
+        for run in loaded:
+            done.append(compare_run(run, support=support, model=model))
+            tell(len(done), len(loaded))
+    return done
+
+
+def _support(
+    clamp_angle_deg: float,
+    gravity_m_s2: tuple[float, float, float] | None,
+    load_factor: float,
+) -> Support:
+    from ..sim import Support
+
+    return Support(
+        clamp_angle_deg=clamp_angle_deg,
+        gravity_m_s2=gravity_m_s2 or (0.0, 0.0, 0.0),
+        load_factor=load_factor,
+    )
+
+
+def _choice(value: str, allowed: Sequence[str], option: str) -> str:
+    if value not in allowed:
+        raise typer.BadParameter(
+            f"must be {' or '.join(allowed)}; instead received {value!r}",
+            param_hint=option,
+        )
+    return value
+
+
+def _nuisance(hold: Sequence[str], prior: Sequence[str]) -> Any:
+    """Return the priors with the named ones held or changed."""
+    from dataclasses import replace
+
+    from ..analysis.fit_problem import NUISANCE_NAMES, Nuisance
+
+    values: dict[str, float] = {}
+    for text in prior:
+        name, _, number = text.partition("=")
+        try:
+            values[name] = float(number)
+        except ValueError:
+            raise typer.BadParameter(
+                f"must be NAME=SD; instead received {text!r}", param_hint="--prior"
+            ) from None
+    for name in NUISANCE_NAMES if "all" in hold else hold:
+        values[name] = 0.0
+    unknown = [name for name in values if name not in NUISANCE_NAMES]
+    if unknown:
+        raise typer.BadParameter(
+            f"must be one of {', '.join(NUISANCE_NAMES)}; "
+            f"instead received {unknown[0]!r}",
+            param_hint="--hold, --prior",
+        )
+    return replace(Nuisance(), **values)
+
+
+def _print_comparison(table: pd.DataFrame, done: Sequence[RunComparison]) -> None:
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    shown = (
+        ("run", "run", None), ("step", "step", "d"), ("gap mm", "gap_mm", ".1f"),
+        ("flux mT", "flux_mT", ".2f"), ("model", "model", None),
+        ("RMS mm", "rms_mm", ".3f"), ("max mm", "max_mm", ".3f"),
+        ("tip mm", "tip_mm", ".3f"), ("tip %", "tip_percent", ".2f"),
+        ("angle deg", "tip_angle_deg", ".2f"), ("R meas", "radius_measured_mm", ".1f"),
+        ("R sim", "radius_simulated_mm", ".1f"), ("status", "status", None),
+    )  # fmt: skip
+    view = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for title, _, form in shown:
+        view.add_column(title, justify="right" if form else "left", overflow="fold")
+    for row in table.to_dict("records"):
+        view.add_row(*(_cell(row[name], form) for _, name, form in shown))
+    console = Console()
+    # A pipe has no width of its own: rows stay whole.
+    console.width = (
+        max(console.width, 120) if not console.is_terminal else console.width
+    )
+    console.print(view)
+    for run in done:
+        for warning in run.run.warnings:
+            typer.echo(f"{run.run.label}: {warning}", err=True)
+
+
+def _cell(value: Any, form: str | None) -> str:
+    if form is None:
+        return str(value)
+    return "-" if isinstance(value, float) and math.isnan(value) else f"{value:{form}}"
+
+
+def _print_fit(result: FitResult, path: Path, posterior: dict[str, Any] | None) -> None:
+    typer.echo(
+        f"{result.specimen.name}: {result.steps} steps, {result.model} field, "
+        f"reduced chi2 {result.chi2_reduced:.2f}, "
+        f"condition number {result.condition_number:.3g}"
+    )
+    for name, value, sd in zip(
+        result.parameters, result.values, result.sd, strict=True
+    ):
+        if name in result.not_identifiable:
+            typer.echo(f"  {name:20} not identifiable")
+        else:
+            typer.echo(
+                f"  {name:20} {value:.4g} +- {sd:.2g} ({100 * sd / value:.1f} %)"
+            )
+    for k, name in enumerate(result.parameters):
+        for m in range(k):
+            value = result.correlation[k, m]
+            if abs(value) > 0.5:
+                typer.echo(
+                    f"  correlation of {result.parameters[m]}, {name}: {value:.2f}"
+                )
+    for sentence in result.directions:
+        typer.echo(f"not identifiable: {sentence}")
+    for name, (value, sd) in result.ratios.items():
+        typer.echo(f"  {name} = {value:.4g} +- {sd:.2g} is what the data tell")
+    for sentence in result.skipped:
+        typer.echo(f"left out: {sentence}", err=True)
+    if posterior:
+        for name, low, middle, high in zip(
+            posterior["parameters"],
+            *(posterior[key] for key in ("q2_5", "median", "q97_5")),
+            strict=True,
+        ):
+            typer.echo(
+                f"  posterior {name}: {middle:.4g} (95 %: {low:.4g} to {high:.4g})"
+            )
+    typer.echo(str(path))
