@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..core.errors import InputError
 from ..core.files import write_bytes
 
@@ -69,7 +71,7 @@ def training_figure(report: TrainingReport, published_per_mm2: float) -> Any:
     for row, (split, errors) in enumerate(report.test_mse_per_mm2.items()):
         colour = COLOURS[row]
         axes.plot(errors, [row] * len(errors), "o", color=colour, alpha=0.6, ms=5)
-        median = sorted(errors)[len(errors) // 2]
+        median = float(np.median(errors))
         axes.plot(median, row, "|", color=colour, ms=24, mew=2)
         axes.text(median, row + 0.25, SPLIT_LABELS[split], ha="center", fontsize=8)
     axes.axvline(published_per_mm2, color="0.3", ls="--", lw=1)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import typer
 
+from . import library
 from .console import print_json, progress
 
 
@@ -122,3 +123,4 @@ def register(app: typer.Typer) -> None:
     """Add the commands to ``magbend analysis``."""
     app.command("train", epilog=TRAIN_EXAMPLE)(train)
     app.command("predict", epilog=PREDICT_EXAMPLE)(predict)
+    app.add_typer(library.app, name="library")

@@ -42,7 +42,8 @@ STATUS = ("stable", "unstable", "pulled in: no equilibrium", "not solved")
 ORDER = 10
 STEP = 0.6
 _FIELD = 17
-_ROWS_PER_CALL = 512
+ROWS_PER_CALL = 512
+"""Designs that one thread solves at a time; their shapes fit its cache."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,10 +168,10 @@ def in_threads(kernel: Callable[..., None], shared: Array, *rows: NDArray) -> No
     where it falls back, and does not survive a fork.
     """
     n = len(rows[0])
-    starts = range(0, n, _ROWS_PER_CALL)
+    starts = range(0, n, ROWS_PER_CALL)
 
     def call(start: int) -> None:
-        kernel(shared, *(array[start : start + _ROWS_PER_CALL] for array in rows))
+        kernel(shared, *(array[start : start + ROWS_PER_CALL] for array in rows))
 
     if len(starts) <= 1:
         for start in starts:

@@ -1,0 +1,1 @@
+"""The prediction library: a design space solved into a Parquet data set."""

@@ -1,0 +1,358 @@
+"""Solve a design space into a folder of Parquet partitions, here or on a Dask cluster.
+
+The folder explains itself:
+
+    library.json           the space, its digest, versions, columns; written first
+    part-000000.parquet    designs 0 to partition_rows - 1, and so on
+
+A partition is written beside, synced and renamed, so that it is whole or absent: a
+build that was killed goes on where it stopped and repeats none that is there.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import MissingExtraError, StoreError
+from ...core.files import write_bytes, write_text
+from ...core.progress import Progress, silent
+from ...sim.batch_shapes import ROWS_PER_CALL, STATUS, Designs, cores, solve_shapes
+from .. import descriptors
+from .space import Space
+
+Columns = dict[str, NDArray]
+
+SCHEMA = 1
+MANIFEST = "library.json"
+STATIONS = (25, 50, 75)
+"""Percent of the length at which the shape is stored, beside the tip."""
+POINTS = 61
+ROW_GROUP = 32_768
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BuildSummary:
+    """What a build did.
+
+    Parameters
+    ----------
+    designs, partitions : int
+        Of the whole library.
+    solved_partitions : int
+        Of these, solved by this build; the others were there.
+    repaired : tuple of str
+        Partitions that were there but damaged, and have been solved again.
+    """
+
+    designs: int
+    partitions: int
+    solved_partitions: int
+    repaired: tuple[str, ...]
+
+
+def build(
+    space: Space,
+    out: Path,
+    *,
+    scheduler: str | None = None,
+    progress: Progress = silent,
+) -> BuildSummary:
+    """Solve a design space into the folder `out`, going on where a build stopped.
+
+    Parameters
+    ----------
+    space : Space
+    out : Path
+        A new folder, or the folder of an unfinished build of the same space.
+    scheduler : str, optional
+        Address of a Dask scheduler whose workers see `out` under the same path.
+    progress : Progress
+        Told in designs.
+
+    Raises
+    ------
+    StoreError
+        If `out` holds something else, or the scheduler does not answer.
+    MissingExtraError
+        If pyarrow, or for a cluster distributed, is not installed.
+    """
+    require_pyarrow()
+    client = _connect(scheduler) if scheduler else None
+    try:
+        _claim(space, out)
+        total = partition_count(space)
+        good, damaged = _finished(space, out, total)
+        missing = [i for i in range(total) if i not in good]
+        rows = [len(_range(space, i)) for i in range(total)]
+        done = sum(rows[i] for i in good)
+        progress(done, space.size)
+        run = _on_cluster(client, space, out, missing) if client else _here(
+            space, out, missing
+        )  # fmt: skip
+        for index in run:
+            done += rows[index]
+            progress(done, space.size)
+    finally:
+        if client is not None:
+            client.close()
+    return BuildSummary(
+        designs=space.size,
+        partitions=total,
+        solved_partitions=len(missing),
+        repaired=tuple(damaged),
+    )
+
+
+def partition_count(space: Space) -> int:
+    """Return how many partitions a space has."""
+    return -(-space.size // space.partition_rows)
+
+
+def partition_path(out: Path, index: int) -> Path:
+    """Return the path of a partition."""
+    return out / f"part-{index:06d}.parquet"
+
+
+def solve_partition(space: Space, out: Path, index: int) -> int:
+    """Solve one partition and write it, whole or not at all; return its index."""
+    import io
+
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    designs = _range(space, index)
+    chunks = []
+    for start in range(designs.start, designs.stop, ROWS_PER_CALL):
+        stop = min(start + ROWS_PER_CALL, designs.stop)
+        chunk: Columns = {"design": np.arange(start, stop, dtype=np.int64)}
+        chunk.update(describe_designs(space.rows(start, stop)))
+        chunks.append(chunk)
+    columns: dict[str, Any] = {
+        name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]
+    }
+    codes = pa.array(columns.pop("status"), type=pa.int8())
+    columns["status"] = pa.DictionaryArray.from_arrays(codes, list(STATUS))
+    buffer = io.BytesIO()
+    pq.write_table(
+        pa.table(columns), buffer, compression="zstd", compression_level=1,
+        row_group_size=ROW_GROUP, use_dictionary=_dictionaries(space),
+        write_page_checksum=True,
+    )  # fmt: skip
+    write_bytes(partition_path(out, index), buffer.getvalue())
+    return index
+
+
+def describe_designs(designs: Designs) -> Columns:
+    """Solve designs; return the columns of their rows in the library."""
+    columns: Columns = {}
+    for i in range(designs.length_mm.shape[1]):
+        columns[f"length{i + 1}_mm"] = designs.length_mm[:, i]
+    for i in range(designs.E_MPa.shape[1]):
+        columns[f"E{i + 1}_MPa"] = designs.E_MPa[:, i]
+    columns["side_mm"] = designs.side_mm
+    columns["remanence_mT"] = designs.remanence_mT
+    if designs.flux_mT is not None:
+        columns["angle_deg"] = designs.angle_deg
+        columns["flux_mT"] = designs.flux_mT
+    elif designs.gap_mm is not None:
+        columns["gap_mm"] = designs.gap_mm
+    solved = solve_shapes(designs, points=POINTS)
+    described = descriptors.describe(solved.points)
+    for name, column in zip(descriptors.COLUMNS, described.T, strict=True):
+        columns[name] = column.astype(np.float32)
+    for percent in STATIONS:
+        at = solved.points[:, percent * (POINTS - 1) // 100]
+        columns[f"x{percent}_mm"] = at[:, 1].astype(np.float32)
+        columns[f"y{percent}_mm"] = at[:, 2].astype(np.float32)
+    columns["error_mm"] = solved.error_mm.astype(np.float32)
+    columns["status"] = solved.status
+    return columns
+
+
+def require_pyarrow() -> None:
+    """Raise a sentence if pyarrow is missing.
+
+    Raises
+    ------
+    MissingExtraError
+        If it is.
+    """
+    try:
+        import pyarrow.parquet  # noqa: F401
+    except ImportError:
+        raise MissingExtraError(
+            "pyarrow", "library", "the prediction library"
+        ) from None
+
+
+def read_manifest(out: Path) -> dict[str, Any]:
+    """Return ``library.json`` of a library.
+
+    Raises
+    ------
+    StoreError
+        If there is none, or it is damaged.
+    """
+    path = out / MANIFEST
+    try:
+        manifest: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        if manifest["schema"] != SCHEMA:
+            raise ValueError(f"schema {manifest['schema']!r} is not known")
+        int(manifest["designs"]), int(manifest["partitions"]), manifest["digest"]
+    except (FileNotFoundError, NotADirectoryError):
+        raise StoreError(
+            f"{out}: is no prediction library ({MANIFEST} is missing); "
+            "build one with `magbend analysis library build`"
+        ) from None
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise StoreError(f"{path}: is damaged: {error}") from None
+    return manifest
+
+
+def _range(space: Space, index: int) -> range:
+    start = index * space.partition_rows
+    return range(start, min(start + space.partition_rows, space.size))
+
+
+def _dictionaries(space: Space) -> list[str]:
+    """Columns that repeat few values, worth a dictionary."""
+    names = ["status", "angle_deg", "side_mm", "remanence_mT", "flux_mT", "gap_mm"]
+    for i in range(1, len(space.section) + 1):
+        names += [f"length{i}_mm", f"E{i}_MPa"]
+    return names if space.method == "grid" else ["status", "angle_deg"]
+
+
+def _manifest(space: Space) -> dict[str, Any]:
+    data = space.model_dump(mode="json", exclude_none=True)
+    text = json.dumps(data, sort_keys=True)
+    return {
+        "schema": SCHEMA,
+        "name": space.name,
+        "digest": hashlib.sha256(text.encode()).hexdigest(),
+        "designs": space.size,
+        "partitions": partition_count(space),
+        "space": data,
+        "shape": f"{POINTS} points; x25_mm ... y75_mm at percent of the length",
+        "radius": "least-squares circle through the whole centreline",
+        "versions": {
+            "python": platform.python_version(),
+            **{
+                name: version(name) for name in ("magbend", "numpy", "numba", "pyarrow")
+            },
+        },
+    }
+
+
+def _claim(space: Space, out: Path) -> None:
+    """Write the manifest into a new folder, or check that `out` is this library.
+
+    Raises
+    ------
+    StoreError
+        If `out` is something else.
+    """
+    manifest = _manifest(space)
+    if (out / MANIFEST).exists():
+        if read_manifest(out)["digest"] != manifest["digest"]:
+            raise StoreError(
+                f"{out}: holds the library of another space; give a new --out folder"
+            )
+        for stale in out.glob(".part-*.tmp"):
+            stale.unlink()
+        return
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+        raise StoreError(f"{out}: exists and is no library; give a new --out folder")
+    out.mkdir(parents=True, exist_ok=True)
+    write_text(out / MANIFEST, json.dumps(manifest, indent=2) + "\n")
+
+
+def _finished(space: Space, out: Path, total: int) -> tuple[set[int], list[str]]:
+    """Return which partitions are there and whole, and the names of damaged ones."""
+    good, damaged = set(), []
+    for index in range(total):
+        if _is_whole(space, out, index):
+            good.add(index)
+        elif partition_path(out, index).exists():
+            damaged.append(partition_path(out, index).name)
+    return good, damaged
+
+
+def _here(space: Space, out: Path, missing: list[int]) -> Iterator[int]:
+    if not missing:
+        return
+    with ThreadPoolExecutor(cores()) as pool:
+        futures = [pool.submit(solve_partition, space, out, i) for i in missing]
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _connect(address: str) -> Any:
+    try:
+        from distributed import Client
+    except ImportError:
+        raise MissingExtraError(
+            "distributed", "cluster", "building on a cluster"
+        ) from None
+    import logging
+
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    try:
+        return Client(address, timeout=10, set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        reason = " ".join(str(error).split())[:160] or type(error).__name__
+        raise StoreError(
+            f"--scheduler {address}: no Dask scheduler answers there ({reason}); "
+            "start one with `dask scheduler` or leave the option out"
+        ) from None
+
+
+def _on_cluster(
+    client: Any, space: Space, out: Path, missing: list[int]
+) -> Iterable[int]:
+    """Have workers solve partitions; a killed worker's tasks go to the others."""
+    from distributed import as_completed as completed
+
+    data = space.model_dump(mode="json", exclude_none=True)
+    futures = client.map(
+        _task, missing, data=data, out=str(out.resolve()), pure=False, retries=2
+    )
+    for future in completed(futures):
+        if future.status != "finished":
+            raise StoreError(
+                f"a worker failed on a partition: {future.exception()}; the finished "
+                "ones are kept, start the build again"
+            )
+        yield int(future.result())
+
+
+def _task(index: int, *, data: dict[str, Any], out: str) -> int:
+    """Solve a partition on a worker, unless it is there."""
+    space, folder = Space.model_validate(data), Path(out)
+    if _is_whole(space, folder, index):
+        return index
+    return solve_partition(space, folder, index)
+
+
+def _is_whole(space: Space, out: Path, index: int) -> bool:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        rows = pq.read_metadata(partition_path(out, index)).num_rows
+    except (pa.ArrowException, OSError):
+        return False
+    return bool(rows == len(_range(space, index)))

@@ -1,0 +1,135 @@
+"""Conditions typed by people, as Arrow expressions: a small, closed language.
+
+``tip_y_mm > 4 and side_mm <= 1``, ``10 < radius_mm < 50 or status != "stable"``,
+``not flux_mT in (10, 20)``. Only columns, numbers, strings, comparisons and logic:
+nothing is evaluated as Python.
+"""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import math
+import operator
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from ...core.errors import InputError
+
+_COMPARE = {
+    ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt,
+    ast.GtE: operator.ge, ast.Eq: operator.eq, ast.NotEq: operator.ne,
+}  # fmt: skip
+
+
+def parse_where(text: str, columns: Sequence[str]) -> Any:
+    """Return the Arrow expression of a ``--where`` condition.
+
+    Raises
+    ------
+    InputError
+        If it is no condition, or names a column that the library does not have.
+    """
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError):
+        raise InputError(
+            f"--where must be a condition such as 'tip_y_mm > 4 and side_mm < 1'; "
+            f"instead received {text!r}"
+        ) from None
+    return _node(tree, columns, text)
+
+
+def parse_range(text: str, columns: Sequence[str]) -> Any:
+    """Return the Arrow expression of a ``--range KEY=LOW:HIGH``; an end may be empty.
+
+    Raises
+    ------
+    InputError
+        If it is no range, or is empty, or the column is not known.
+    """
+    import pyarrow.dataset as ds
+
+    name, equals, ends = text.partition("=")
+    low_text, colon, high_text = ends.partition(":")
+    try:
+        low = float(low_text) if low_text.strip() else -math.inf
+        high = float(high_text) if high_text.strip() else math.inf
+    except ValueError:
+        low = high = math.nan
+    if not equals or not colon or not low <= high:
+        raise InputError(
+            "--range must be KEY=LOW:HIGH with LOW not above HIGH, such as "
+            f"tip_y_mm=4:6; instead received {text!r}"
+        )
+    field = ds.field(known(name.strip(), columns))
+    return (field >= low) & (field <= high)
+
+
+def known(name: str, columns: Sequence[str]) -> str:
+    """Return `name` if it is a column.
+
+    Raises
+    ------
+    InputError
+        If it is not, with the nearest name.
+    """
+    if name in columns:
+        return name
+    close = difflib.get_close_matches(name, columns, n=1, cutoff=0.5)
+    hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(columns)}"
+    raise InputError(f"the library has no column {name!r}; {hint}")
+
+
+def all_of(expressions: Iterable[Any]) -> Any:
+    """Return the conjunction of expressions, None of none."""
+    joined = None
+    for expression in expressions:
+        joined = expression if joined is None else joined & expression
+    return joined
+
+
+def _node(node: ast.expr, columns: Sequence[str], text: str) -> Any:
+    if isinstance(node, ast.BoolOp):
+        parts = [_node(value, columns, text) for value in node.values]
+        joined = parts[0]
+        for part in parts[1:]:
+            joined = joined & part if isinstance(node.op, ast.And) else joined | part
+        return joined
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+        return ~_node(node.operand, columns, text)
+    if isinstance(node, ast.Compare):
+        return _comparison(node, columns, text)
+    raise InputError(f"--where cannot use {ast.unparse(node)!r} in {text!r}")
+
+
+def _comparison(node: ast.Compare, columns: Sequence[str], text: str) -> Any:
+    parts = []
+    left = node.left
+    for op, right in zip(node.ops, node.comparators, strict=True):
+        if isinstance(op, ast.In) and isinstance(right, (ast.Tuple, ast.List)):
+            values = [_value(item, columns, text) for item in right.elts]
+            parts.append(_value(left, columns, text).isin(values))
+        elif type(op) in _COMPARE:
+            pair = _value(left, columns, text), _value(right, columns, text)
+            parts.append(_COMPARE[type(op)](*pair))
+        else:
+            raise InputError(f"--where cannot use {ast.unparse(node)!r} in {text!r}")
+        left = right
+    if any(isinstance(part, bool) for part in parts):
+        raise InputError(f"--where compares no column in {ast.unparse(node)!r}")
+    return all_of(parts)
+
+
+def _value(node: ast.expr, columns: Sequence[str], text: str) -> Any:
+    import pyarrow.dataset as ds
+
+    if isinstance(node, ast.Name):
+        return ds.field(known(node.id, columns))
+    if isinstance(node, ast.Constant) and type(node.value) in (int, float, str):
+        return node.value
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.USub, ast.UAdd)):
+        value = _value(node.operand, columns, text)
+        if isinstance(value, (int, float)):
+            return -value if isinstance(node.op, ast.USub) else value
+    raise InputError(f"--where cannot use {ast.unparse(node)!r} in {text!r}")

@@ -1,0 +1,115 @@
+"""``magbend analysis library build | query``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+from .console import group, print_json, progress
+
+app = group(
+    "library",
+    "Build and search the prediction library.",
+    "magbend analysis library build fixtures/library/million.toml --out million",
+)
+
+BUILD_EXAMPLE = (
+    "Example: magbend analysis library build fixtures/library/million.toml --out DIR"
+)
+QUERY_EXAMPLE = (
+    'Example: magbend analysis library query DIR --where "tip_y_mm > 4 and side_mm < 1"'
+    " --sort=-circularity --top 10 --out best.csv"
+)
+
+
+@app.command(epilog=BUILD_EXAMPLE)
+def build(
+    space: Path = typer.Argument(..., help="The design space, TOML."),
+    out: Path = typer.Option(..., "--out", help="Folder of the library."),
+    scheduler: str | None = typer.Option(
+        None,
+        "--scheduler",
+        help="Dask scheduler, such as tcp://host:8786; workers must see --out.",
+    ),
+    as_json: bool = typer.Option(False, "--json", help="Print JSON."),
+) -> None:
+    """Solve a design space into Parquet; go on where an earlier build stopped."""
+    from dataclasses import asdict
+
+    from ..analysis.library import build as builder
+    from ..analysis.library.space import read_space
+
+    what = read_space(space)
+    with progress("designs") as tell:
+        summary = builder.build(what, out, scheduler=scheduler, progress=tell)
+    if as_json:
+        print_json(asdict(summary))
+        return
+    solved, total = summary.solved_partitions, summary.partitions
+    typer.echo(f"{summary.designs} designs in {total} partitions in {out}")
+    typer.echo(f"{solved} partitions solved now, {total - solved} were there")
+    for name in summary.repaired:
+        typer.echo(f"warning: {name} was damaged and has been solved again", err=True)
+
+
+@app.command(epilog=QUERY_EXAMPLE)
+def query(
+    library: Path = typer.Argument(..., help="Folder of the library."),
+    where: str | None = typer.Option(None, "--where", help="Condition on columns."),
+    ranges: list[str] = typer.Option([], "--range", help="KEY=LOW:HIGH, repeatable."),
+    nearest: Path | None = typer.Option(
+        None, "--nearest", help="A shape.csv; rank by distance from it."
+    ),
+    sort: str | None = typer.Option(
+        None, "--sort", help="Column to rank by; --sort=-COLUMN for falling."
+    ),
+    top: int = typer.Option(20, "--top", help="How many rows."),
+    out: Path | None = typer.Option(None, "--out", help=".csv or .parquet."),
+    as_json: bool = typer.Option(False, "--json", help="Print JSON."),
+) -> None:
+    """Search a library: conditions, nearest shape, sort, the best few."""
+    from ..analysis.library import query as searching
+    from ..core.centreline import Centreline
+
+    shape = None if nearest is None else Centreline.from_csv(nearest)
+    found = searching.query(
+        library, where=where, ranges=ranges, nearest=shape, sort=sort, top=top
+    )
+    if found.missing_partitions:
+        typer.echo(
+            f"warning: {found.missing_partitions} partitions are not built yet; "
+            "the answer covers the others",
+            err=True,
+        )
+    if out is not None:
+        searching.write_rows(found, out)
+    if as_json:
+        print_json(
+            {
+                "designs": found.designs,
+                "matched": found.matched,
+                "rows": found.table.to_pylist(),
+            }
+        )
+        return
+    typer.echo(f"{found.matched} of {found.designs} designs match")
+    if out is None:
+        _print_table(found.table.to_pylist())
+
+
+def _print_table(rows: list[dict[str, object]]) -> None:
+    if not rows:
+        return
+    hidden = ("x25", "y25", "x50", "y50", "x75", "y75", "a_misfit", "error")
+    names = [name for name in rows[0] if not name.startswith(hidden)]
+    cells = [[_cell(row[name]) for name in names] for row in rows]
+    lines = zip(names, *cells, strict=True)
+    widths = [max(len(cell) for cell in column) for column in lines]
+    for line in [names, *cells]:
+        padded = (c.rjust(w) for c, w in zip(line, widths, strict=True))
+        typer.echo("  ".join(padded))
+
+
+def _cell(value: object) -> str:
+    return f"{value:.5g}" if isinstance(value, float) else str(value)
