@@ -1,18 +1,18 @@
 """From rod to solid: a rod that predicts three-dimensional finite elements.
 
-A plain rod is 0.3 to 0.6 % too soft at the tip against a hard-magnetic neo-Hookean solid
-whose root face is fixed. Five effects, each a term of the rod's equations, close the gap;
-`docs/solid.md` tells what each is worth and how its constant was found.
+A plain rod is 0.3 to 0.6 % too soft at the tip against a hard-magnetic neo-Hookean
+solid whose root face is fixed. Five effects, each a term of the rod's equations, close
+the gap; `docs/solid.md` tells what each is worth and how its constant was found.
 
 * Stretch EA, and shear k GA with Cowper's k = 10 (1 + nu) / (12 + 11 nu) for rectangles
   (J. Appl. Mech. 33, 335, 1966).
-* The magnetic energy is -(1/mu0) (F Br).B: it follows r', stretched and sheared, not the
-  unit tangent. The pole reduction stays exact: the load is the traction Br B / mu0 on the
-  end face, taken at four Gauss points of the face.
-* A fixed face cannot contract sideways, so that bending cannot bow it: seen from afar the
-  rod starts turned back by c a kappa(0) and shifted by d a^2 kappa(0).
-* The same, smaller, at joints where E jumps: c (1 - r)^2 / (1 + 1.4 r) a kappa of the softer
-  side, r the ratio of the moduli.
+* The magnetic energy is -(1/mu0) (F Br).B: it follows r', stretched and sheared, not
+  the unit tangent. The pole reduction stays exact: the load is the traction Br B / mu0
+  on the end face, taken at four Gauss points of the face.
+* A fixed face cannot contract sideways, so that bending cannot bow it: seen from afar
+  the rod starts turned back by c a kappa(0) and shifted by d a^2 kappa(0).
+* The same, smaller, at joints where E jumps: c (1 - r)^2 / (1 + 1.4 r) a kappa of the
+  softer side, r the ratio of the moduli.
 * Second-order elasticity: tension stiffens against bending, bending stretches the axis
   (alpha), and large curvature softens (chi).
 """
@@ -20,6 +20,8 @@ whose root face is fixed. Five effects, each a term of the rod's equations, clos
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,15 +29,38 @@ from ..core.centreline import Centreline
 from ..core.checks import within
 from ..core.errors import InputError
 from ..core.specimen import Specimen
-from ..core.units import rad_from_deg
+from ..core.units import mT_from_T, rad_from_deg
 from .fields import (
-    PULLED_IN, STABLE, UNSTABLE, Field, Solution, Support, UniformField,
+    PULLED_IN,
+    STABLE,
+    UNSTABLE,
+    Field,
+    Solution,
+    Support,
+    UniformField,
 )  # fmt: skip
-from .magnet_field import magnet_flux_mT
+from .magnet_field import cuboid_flux
+from .planar import GONE, ORDER, solve_planar
+from .planar import STEP as PLAIN_STEP
 from .scaling import field_array, rod_array, stations, stiffness_Nmm2
 from .solid_march import (
-    ALPHA, CHI, E, G, H, JOINT, M, RHO, SIDE, SOFT, STEP, T, WIDTH, WX, WY,
-    shape, solve_from,
+    ALPHA,
+    CHI,
+    JOINT,
+    RHO,
+    SIDE,
+    SOFT,
+    STEP,
+    WIDTH,
+    WX,
+    WY,
+    E,
+    G,
+    H,
+    M,
+    T,
+    shape,
+    solve_from,
 )  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -155,15 +180,12 @@ def solve_solid(
     SolverError
         If no answer was found that could be vouched for.
     """
-    from .solve import solve  # which calls this module
-
     support = support or Support()
     _refuse_spatial(field, support)
-    plain = solve(specimen, field, support=support, points=2)
     rod, base = solid_arrays(specimen, support, poisson_ratio)
     flux = field_array(field, specimen.length_mm)
     clamp = rad_from_deg(support.clamp_angle_deg)
-    tip, base = _start(plain, rod, base, specimen.length_mm)
+    tip, base, flux_tip_mT = _start(specimen, field, support, rod, base)
     steps = np.ceil(rod[:, H] * np.sqrt(rod[:, E] * base[2]) / STEP) + 1.0
     trails = np.zeros((3, int(steps.sum()), 3))
     index, load, error, moment = solve_from(
@@ -172,7 +194,7 @@ def solve_solid(
     if index < 0:
         return Solution(
             centreline=None, status=PULLED_IN, morse_index=-1, error_mm=float("nan"),
-            flux_tip_mT=plain.flux_tip_mT, root_moment_Nm=0.0, load_limit=load,
+            flux_tip_mT=flux_tip_mT, root_moment_Nm=0.0, load_limit=load,
         )  # fmt: skip
     s = stations(points)
     table = np.empty((4, points))
@@ -190,11 +212,12 @@ def solve_solid(
         status=STABLE if index == 0 else UNSTABLE,
         morse_index=index,
         error_mm=error * L,
-        flux_tip_mT=_flux_mT(field, centreline, L),
+        flux_tip_mT=_flux_mT(flux, table[0, -1], table[1, -1]),
         root_moment_Nm=-moment * stiffness_Nmm2(specimen)[0] / L * 1e-3,
     )
 
 
+@lru_cache(maxsize=256)
 def solid_arrays(
     specimen: Specimen, support: Support, poisson_ratio: float
 ) -> tuple[Array, Array]:
@@ -223,26 +246,37 @@ def solid_arrays(
 
 
 def _start(
-    plain: Solution, rod: Array, base: Array, length_mm: float
-) -> tuple[Array, Array]:
-    """Return the tip to start from (NaN if there is none), and base with its load."""
-    bx, by = (component * 1e-3 for component in plain.flux_tip_mT)
-    weight = np.hypot(rod[:, WX], rod[:, WY]) @ rod[:, H]
-    load = float(np.max(np.abs(rod[:, M])) * np.hypot(bx, by) + weight)
+    specimen: Specimen, field: Field, support: Support, rod: Array, base: Array
+) -> tuple[Array, Array, tuple[float, float]]:
+    """Return the plain rod's tip (NaN if there is none), base with load, tip flux."""
+    flux = field_array(field, specimen.length_mm)
+    margin = 0.5 * float(rod[:, SIDE].max())
+    clamp = rad_from_deg(support.clamp_angle_deg)
+    outcome, _, load, _, bx, by, _, _, tip = solve_planar(
+        rod_array(specimen, support),
+        flux,
+        clamp,
+        margin,
+        stations(2),
+        ORDER,
+        PLAIN_STEP,
+    )
+    if outcome > GONE:
+        from .solve import failure  # which calls this module
+
+        raise failure(outcome, specimen, field, load)
+    weight = float(np.hypot(rod[:, WX], rod[:, WY]) @ rod[:, H])
+    load = float(np.abs(rod[:, M]).max() * np.hypot(bx, by)) + weight
     highest = load * float(rod[:, E].max())
     if highest > LOAD_LIMIT:
         raise InputError(
             f"the load P L^2 / EI must be below {LOAD_LIMIT:g} for the solid model; "
             f"instead received {highest:.3g}: use the plain rod"
         )
+    if outcome == GONE:
+        tip[0] = np.nan
     base = np.array([base[0], base[1], load])
-    if plain.centreline is None:
-        return np.full(4, np.nan), base
-    sign = -1.0 if rod[0, M] < 0.0 else 1.0
-    phi = float(np.arctan2(sign * by, sign * bx))
-    x_mm, y_mm = plain.centreline.tip_mm
-    theta = float(plain.centreline.theta_rad[-1])
-    return np.array([theta - phi, x_mm / length_mm, y_mm / length_mm, phi]), base
+    return tip, base, (mT_from_T(bx), mT_from_T(by))
 
 
 def _end_zone(table: Array, s: Array, clamp: float, shift: float, side: float) -> None:
@@ -267,8 +301,8 @@ def _refuse_strain(rod: Array, base: Array, kappa: float) -> None:
     if max(stretch, bending) > STRAIN_LIMIT:
         raise InputError(
             f"strains must be below {STRAIN_LIMIT:g} for the solid model; instead "
-            f"received {stretch:.2g} along and {bending:.2g} in bending: the rod is too "
-            "thick or too soft for a rod model"
+            f"received {stretch:.2g} along and {bending:.2g} in bending: the rod is "
+            "too thick or too soft for a rod model"
         )
 
 
@@ -281,16 +315,9 @@ def _refuse_spatial(field: Field, support: Support) -> None:
         )
 
 
-def _flux_mT(
-    field: Field, centreline: Centreline, length_mm: float
-) -> tuple[float, float]:
-    if isinstance(field, UniformField):
-        angle = rad_from_deg(field.angle_deg)
-        return field.flux_mT * float(np.cos(angle)), field.flux_mT * float(
-            np.sin(angle)
-        )
-    x_mm, y_mm = centreline.tip_mm
-    flux = magnet_flux_mT(
-        field.magnet, (x_mm, y_mm, 0.0), length_mm=length_mm, gap_mm=field.gap_mm
-    )
-    return float(flux[0]), float(flux[1])
+def _flux_mT(flux: Array, x: float, y: float) -> tuple[float, float]:
+    if flux[0] == 0.0:
+        return mT_from_T(float(flux[1])), mT_from_T(float(flux[2]))
+    out = np.empty(12)
+    cuboid_flux(flux[1:], x, y, 0.0, out)
+    return mT_from_T(float(out[0])), mT_from_T(float(out[1]))

@@ -2,18 +2,19 @@
 
 Dimensionless as `planar_march`: lengths over L, moments over EI_ref / L, forces over
 EI_ref / L^2, sigma = L - s, q = -M, P the pole load (exact here too, as long as the
-magnetic force follows r': see `solid`). With N and Q the components of P along and across
-the cross-section's normal (cos, sin)(theta), and the section's compliances e (bending), t
-(stretch), g (shear),
+magnetic force follows r': see `solid`). With N and Q the components of P along and
+across the cross-section's normal t = (cos, sin)(theta), n = (-sin, cos)(theta), and the
+section's compliances e (bending), t (stretch) and g (shear),
 
     theta' = e q (1 + alpha t N + chi (e q)^2)
-    eps    = t N + alpha rho (e q)^2 / 2,   gamma = g Q
-    q'     = -Q (1 + eps) + gamma N,        r'  = -(1 + eps) (cos, sin) - gamma (-sin, cos)
+    eps    = t N + alpha rho (e q)^2 / 2,    gamma = g Q
+    q'     = -Q (1 + eps) + gamma N,         r' = -(1 + eps) t - gamma n
 
-A rod is an array (n, 13), tip first, with the columns named below; `JOINT` is the turn of
-the section per curvature of the softer side at the joint towards the root, in lengths of L,
-`SOFT` the compliance of that softer side. The base is (turn, shift, largest load): turn and
-shift per root curvature, and the load that sets the length of the steps.
+A rod is an array (n, 13), tip first, with the columns named below; `JOINT` is the turn
+of the section per curvature of the softer side at the joint towards the root, in
+lengths of L, `SOFT` the compliance of that softer side. The base is (turn, shift,
+largest load): turn and shift per root curvature, and the load that sets the length of
+the steps.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ from .planar_march import jacobi
 H, E, M, WX, WY, T, G, ALPHA, RHO, CHI, SIDE, JOINT, SOFT = range(13)
 WIDTH = 13
 SERIES = 11
-"""Series of a step: theta, q, sin, cos, theta', eps, Q, g N - eps, alpha t N + chi (e q)^2,
-and the increments of x and y."""
+"""Series of a step: theta, q, sin, cos, theta', eps, Q, g N - eps,
+alpha t N + chi (e q)^2, and the increments of x and y."""
 ORDER = 14
 STEP = 0.35
 CONVERGED = 1e-11
