@@ -50,6 +50,7 @@ def board(
         marker_mm=marker_mm,
         dictionary=dictionary,
     )
+    out.parent.mkdir(parents=True, exist_ok=True)
     write_board(design, out, dpi=dpi)
     width, height = design.size_mm
     typer.echo(
@@ -125,6 +126,7 @@ def calibrate(
             camera_height_mm=camera_height_mm,
             focal_px=focal_px,
         )
+    out.parent.mkdir(parents=True, exist_ok=True)
     result.save(out)
     facts = _calibration_facts(result)
     if json_output:
@@ -192,8 +194,11 @@ def extract(
 ) -> None:  # fmt: skip
     """Measure the rod's centreline in photographs."""
     from ..vision.batch import extract_files
+    from ..vision.figures import figure_kind
     from ..vision.inputs import list_sources
 
+    if figure_steps is not None:
+        figure_kind(figure_steps)
     sources = list_sources(images)
     run = _only_run(images)
     if calibration is None and run is not None:
@@ -228,6 +233,7 @@ def extract(
         from ..vision.inputs import read_source
 
         index = next(i for i, frame in enumerate(result.frames) if frame.ok)
+        figure_steps.parent.mkdir(parents=True, exist_ok=True)
         figure_of_steps(read_source(sources[index]), settings, figure_steps)
     _tell_frames(result, json_output=json_output)
 

@@ -187,6 +187,8 @@ def extract_files(
     """
     sources = list_sources(paths)
     out.mkdir(parents=True, exist_ok=True)
+    if edges is not None:
+        edges.parent.mkdir(parents=True, exist_ok=True)
     if overlays:
         (out / "overlays").mkdir(exist_ok=True)
     state = _State(out, edges, settings.fingerprint(), [s.image for s in sources])
@@ -195,10 +197,13 @@ def extract_files(
     todo = [source for source in sources if source.image not in state.done]
     task = _Task(settings, out / "overlays" if overlays else None, edges is not None)
     progress(len(sources) - len(todo), len(sources))
-    for done in _run(task, todo, workers):
-        state.add(done)
-        progress(len(state.done), len(sources))
-    state.write()
+    try:
+        for done in _run(task, todo, workers):
+            state.add(done)
+            progress(len(state.done), len(sources))
+    finally:
+        # After an interruption too: what is measured can be resumed.
+        state.write()
     frames = tuple(tables.read_frames(out / "frames.csv"))
     if not any(frame.ok for frame in frames):
         first = frames[0]

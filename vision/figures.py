@@ -46,29 +46,46 @@ def figure_of_steps(photo: Photo, settings: Settings, path: Path) -> None:
     """
     from matplotlib.figure import Figure
 
+    kind = figure_kind(path)
+    found = measure(photo, settings)
+    if not found.ok:
+        raise VisionError(f"{photo.source}: cannot be measured: {found.reason}")
+    figure = Figure(figsize=(9.0, 7.6))
+    (raw, black), (edges, line) = figure.subplots(2, 2)
+    figure.subplots_adjust(
+        left=0.08, right=0.98, bottom=0.07, top=0.95, wspace=0.22, hspace=0.28
+    )
+    window = _window(found, photo.size_px)
+    _raw(raw, photo, window)
+    _binarised(black, photo, settings, window)
+    _edges(edges, photo, found)
+    _centreline(line, found)
+    for axes in (raw, black, edges, line):
+        axes.tick_params(labelsize=8)
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format=kind, dpi=200)
+    write_bytes(path, buffer.getvalue())
+
+
+def figure_kind(path: Path) -> str:
+    """Return the kind of file that a figure's path asks for.
+
+    Raises
+    ------
+    InputError
+        If the suffix is not one of ``.pdf``, ``.svg`` and ``.png``.
+    """
     kind = path.suffix.lower().lstrip(".")
     if kind not in ("pdf", "svg", "png"):
         raise InputError(
             f"{path}: a figure is written as .pdf, .svg or .png; "
             f"instead received {path.suffix!r}"
         )
-    found = measure(photo, settings)
-    if not found.ok:
-        raise VisionError(f"{photo.source}: cannot be measured: {found.reason}")
-    figure = Figure(figsize=(9.0, 7.2), layout="constrained")
-    (raw, black), (edges, line) = figure.subplots(2, 2)
-    window = _window(found, photo.size_px)
-    _raw(raw, photo, window)
-    _binarised(black, photo, settings, window)
-    _edges(edges, photo, found)
-    _centreline(line, found)
-    for letter, axes in zip("abcd", (raw, black, edges, line), strict=True):
-        axes.set_title(f"{letter}  {axes.get_title()}", loc="left", fontsize=9)
-        axes.title.set_visible(False)
-        axes.tick_params(labelsize=8)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format=kind, dpi=200)
-    write_bytes(path, buffer.getvalue())
+    return kind
+
+
+def _title(axes: Axes, text: str) -> None:
+    axes.set_title(text, loc="left", fontsize=9)
 
 
 def _window(found: Measurement, size_px: tuple[int, int]) -> tuple[int, int, int, int]:
@@ -81,7 +98,7 @@ def _window(found: Measurement, size_px: tuple[int, int]) -> tuple[int, int, int
 
 
 def _raw(axes: Axes, photo: Photo, window: tuple[int, int, int, int]) -> None:
-    axes.set_title("photograph")
+    _title(axes, "a  photograph")
     _show(axes, photo, window)
 
 
@@ -104,7 +121,7 @@ def _show(axes: Axes, photo: Photo, window: tuple[int, int, int, int]) -> None:
 def _binarised(
     axes: Axes, photo: Photo, settings: Settings, window: tuple[int, int, int, int]
 ) -> None:
-    axes.set_title("binarised (relative to the paper's light)")
+    _title(axes, "b  binarised (relative to the paper's light)")
     binary = binarise(photo.grey, invert=settings.invert)
     left, right, top, bottom = window
     if binary is not None:
@@ -126,7 +143,7 @@ def _binarised(
 
 def _edges(axes: Axes, photo: Photo, found: Measurement) -> None:
     """Show the last piece before the tip, close up, with its edges and axis."""
-    axes.set_title("edges and axis near the tip")
+    _title(axes, "c  edges and axis near the tip")
     tip = np.array(found.tip_px)
     reach = max(3.0 * found.width_px, 20.0)
     width, height = photo.size_px
@@ -150,7 +167,7 @@ def _edges(axes: Axes, photo: Photo, found: Measurement) -> None:
 def _centreline(axes: Axes, found: Measurement) -> None:
     points = found.points
     calibrated = found.pose is not None
-    axes.set_title("centreline" + (", specimen frame" if calibrated else ""))
+    _title(axes, "d  centreline" + (", specimen frame" if calibrated else ""))
     unit = "mm" if calibrated else "px"
     axes.plot(points[f"x_{unit}"], points[f"y_{unit}"], "-", lw=1.4, c=_AXIS)
     axes.plot(points[f"x_{unit}"][0], points[f"y_{unit}"][0], "ks", ms=4)

@@ -32,16 +32,14 @@ class Source:
         The file.
     frame : int or None
         Number of the frame in a video.
+    overlay : str
+        Name of its overlay.
     """
 
     image: str
     path: Path
     frame: int | None = None
-
-    @property
-    def overlay(self) -> str:
-        """Name of its overlay."""
-        return f"{Path(self.image).stem if self.frame is None else self.image}.png"
+    overlay: str = ""
 
 
 def list_sources(paths: Iterable[Path]) -> list[Source]:
@@ -105,21 +103,32 @@ def _of_video(path: Path) -> list[Source]:
 
 
 def _with_distinct_names(sources: list[Source]) -> list[Source]:
+    """Add the folder's name, then a number, to names that occur twice."""
     unique = list(dict.fromkeys(sources))
-    stems = Counter(source.overlay for source in unique)
-    named = [
-        source
-        if stems[source.overlay] == 1
-        else replace(source, image=f"{source.path.parent.name}_{source.image}")
+    for rename in (
+        lambda _, source: f"{source.path.parent.name}_{source.image}",
+        lambda index, source: f"{index:04d}_{source.image}",
+    ):
+        held = Counter(source.image for source in unique)
+        unique = [
+            source
+            if held[source.image] == 1
+            else replace(source, image=rename(index, source))
+            for index, source in enumerate(unique)
+        ]
+    stems = Counter(_stem(source) for source in unique)
+    return [
+        replace(
+            source,
+            overlay=(source.image if stems[_stem(source)] > 1 else _stem(source))
+            + ".png",
+        )
         for source in unique
     ]
-    if len({source.overlay for source in named}) < len(named):
-        # The same stem within one folder (a.png and a.jpg): number them.
-        named = [
-            replace(source, image=f"{index:04d}_{source.image}")
-            for index, source in enumerate(named)
-        ]
-    return named
+
+
+def _stem(source: Source) -> str:
+    return source.image if source.frame is not None else Path(source.image).stem
 
 
 def read_source(source: Source) -> Photo:
