@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
 
 Array = NDArray[np.float64]
 
@@ -141,6 +141,7 @@ def fit_curve(
     joints: Sequence[float] = (),
     iterations: int = 2,
     theta: Array | None = None,
+    stiffness: float | None = None,
 ) -> CurveFit:
     """Fit theta(s) to points measured near an even grid of arc length.
 
@@ -160,6 +161,8 @@ def fit_curve(
         Gauss-Newton steps.
     theta : ndarray, shape (n,), optional
         Tangent angles to start from; otherwise from the points.
+    stiffness : float, optional
+        Weight of the penalty, px^3; the most likely one when not given.
 
     Returns
     -------
@@ -167,34 +170,30 @@ def fit_curve(
         With covariances.
     """
     knots = _knots(s[0], s[-1], spacing, joints)
-    middle = 0.5 * (s[1:] + s[:-1])
-    basis = _design(knots, s)
-    basis_mid = _design(knots, middle)
+    basis, slopes = _design(knots, s)
+    basis_mid, _ = _design(knots, 0.5 * (s[1:] + s[:-1]))
     penalty = _penalty(knots)
     if theta is None:
         theta = _chord_angles(points)
-    start = (
-        basis.T @ basis + 1e-3 * penalty * spacing**3 + 1e-9 * np.eye(basis.shape[1])
-    )
+    start = basis.T @ basis + 1e-3 * penalty * spacing**3
+    start += 1e-9 * np.eye(basis.shape[1])
     coefficients = np.linalg.solve(start, basis.T @ theta)
     weight = weights / max(float(weights.max()), 1e-12)
     origin = _origin(s, points, weight, basis_mid @ coefficients)
-    step = s[1] - s[0]
-    for _ in range(iterations):
-        curve = _integrate(s, origin, coefficients, basis, basis_mid)
-        jacobian = _jacobian(curve, basis, basis_mid, coefficients, step)
+    for turn in range(iterations):
+        curve = _integrate(s, origin, coefficients, basis, basis_mid, slopes)
+        jacobian = _jacobian(curve, basis_mid, coefficients)
         residual = np.sum((points - curve.points) * curve.normals, axis=1)
         residual[weight == 0.0] = 0.0
-        system = _solve(jacobian, residual, weight, penalty, coefficients)
+        if turn < 2:
+            strength = stiffness
+        system = _solve(jacobian, residual, weight, penalty, coefficients, strength)
+        strength = system.strength
         origin = origin + system.change[0] * curve.normals[0]
         coefficients = coefficients + system.change[1:]
-    curve = _integrate(
-        s, origin, coefficients, basis, basis_mid,
-        kappa=np.asarray(BSpline(knots, coefficients, _DEGREE).derivative()(s)),
-    )  # fmt: skip
+    curve = _integrate(s, origin, coefficients, basis, basis_mid, slopes)
     residual = np.sum((points - curve.points) * curve.normals, axis=1)
     residual[weight == 0.0] = np.nan
-    slopes = _slope_design(knots, s, basis.shape[1])
     return _with_covariance(curve, residual, weight, jacobian, system, basis, slopes)
 
 
@@ -203,6 +202,7 @@ class _System:
     change: Array
     inverse_root: Array
     freedom: float
+    strength: float
 
 
 def _knots(first: float, last: float, spacing: float, joints: Sequence[float]) -> Array:
@@ -218,27 +218,70 @@ def _knots(first: float, last: float, spacing: float, joints: Sequence[float]) -
     return np.concatenate(pieces)
 
 
-def _design(knots: Array, s: Array) -> Array:
-    return np.asarray(BSpline.design_matrix(s, knots, _DEGREE).toarray())
+def _design(knots: Array, s: Array) -> tuple[Array, Array]:
+    """Return the cubic B-splines and their derivatives at s, each (n, count)."""
+    basis = np.zeros((len(s), len(knots) - _DEGREE - 1))
+    slopes = np.zeros_like(basis)
+    _fill_basis(knots, s, basis, slopes)
+    return basis, slopes
 
 
-def _slope_design(knots: Array, s: Array, count: int) -> Array:
-    return np.asarray(BSpline(knots, np.eye(count), _DEGREE).derivative()(s))
+@njit(cache=True)
+def _fill_basis(knots: Array, s: Array, basis: Array, slopes: Array) -> None:
+    """Cox and de Boor's recurrence; s must not fall."""
+    count = basis.shape[1]
+    value = np.zeros(4)
+    lower = np.zeros(4)
+    k = 3
+    for i in range(s.size):
+        x = s[i]
+        while k < count - 1 and x >= knots[k + 1]:
+            k += 1
+        value[:] = 0.0
+        value[3] = 1.0
+        for degree in range(1, 4):
+            if degree == 3:
+                lower[:] = value
+            for j in range(3 - degree, 4):
+                left = k - 3 + j
+                total = 0.0
+                span = knots[left + degree] - knots[left]
+                if j > 3 - degree and span > 0.0:
+                    total += (x - knots[left]) / span * value[j]
+                span = knots[left + degree + 1] - knots[left + 1]
+                if j < 3 and span > 0.0:
+                    total += (knots[left + degree + 1] - x) / span * value[j + 1]
+                value[j] = total
+        for j in range(4):
+            left = k - 3 + j
+            basis[i, left] = value[j]
+            rate = 0.0
+            span = knots[left + 3] - knots[left]
+            if j > 0 and span > 0.0:
+                rate += lower[j] / span
+            span = knots[left + 4] - knots[left + 1]
+            if j < 3 and span > 0.0:
+                rate -= lower[j + 1] / span
+            slopes[i, left] = 3.0 * rate
 
 
 def _penalty(knots: Array) -> Array:
-    """Integral of theta''^2, exact: theta'' is linear between knots (Gauss)."""
-    count = len(knots) - _DEGREE - 1
+    """Integral of theta''^2, exact: theta' is a parabola between knots."""
     low, high = knots[_DEGREE:-_DEGREE - 1], knots[_DEGREE + 1:-_DEGREE]  # fmt: skip
     real = high > low
     low, high = low[real], high[real]
-    half, centre = 0.5 * (high - low), 0.5 * (high + low)
-    second = BSpline(knots, np.eye(count), _DEGREE).derivative(2)
-    total = np.zeros((count, count))
-    for sign in (-1.0, 1.0):
-        value = np.asarray(second(centre + sign * half / np.sqrt(3.0)))
-        total += value.T @ (value * half[:, None])
-    return total
+    # theta'' is linear: its square by Simpson from both ends and the middle; each from
+    # theta' at points well inside, where no knot is in doubt.
+    length = high - low
+    inner = low[:, None] + length[:, None] * np.array([0.1, 0.5, 0.9])
+    _, slopes = _design(knots, inner.ravel())
+    first, middle, last = slopes.reshape(len(low), 3, -1).transpose(1, 0, 2)
+    step = 0.4 * length[:, None]
+    bend = (first - 2.0 * middle + last) / step**2
+    centre = (last - first) / (2.0 * step)
+    half = 0.5 * length[:, None]
+    total: Array = (centre * length[:, None]).T @ centre
+    return total + (bend * 2.0 * half**3 / 3.0).T @ bend
 
 
 def _chord_angles(points: Array) -> Array:
@@ -258,7 +301,7 @@ def _origin(s: Array, points: Array, weight: Array, theta_mid: Array) -> Array:
 
 def _integrate(
     s: Array, origin: Array, coefficients: Array, basis: Array, basis_mid: Array,
-    kappa: Array | None = None,
+    slopes: Array,
 ) -> Curve:  # fmt: skip
     theta = basis @ coefficients
     mid = basis_mid @ coefficients
@@ -271,32 +314,47 @@ def _integrate(
     points[1:] = origin + np.cumsum(
         h / 6.0 * (rate[:-1] + 4.0 * rate_mid + rate[1:]), axis=0
     )
-    slope = np.gradient(theta, h) if kappa is None else kappa
-    return Curve(s=s, points=points, theta=theta, kappa=slope)
+    return Curve(s=s, points=points, theta=theta, kappa=slopes @ coefficients)
 
 
-def _jacobian(
-    curve: Curve, basis: Array, basis_mid: Array, coefficients: Array, step: float
-) -> Array:
+def _jacobian(curve: Curve, basis_mid: Array, coefficients: Array) -> Array:
     """Change of the normal position by origin (along its normal) and coefficients."""
-    mid = basis_mid @ coefficients
-    along_x = np.zeros_like(basis)
-    along_y = np.zeros_like(basis)
-    np.cumsum(-step * np.sin(mid)[:, None] * basis_mid, axis=0, out=along_x[1:])
-    np.cumsum(step * np.cos(mid)[:, None] * basis_mid, axis=0, out=along_y[1:])
-    n = curve.normals
-    jacobian = np.empty((len(basis), basis.shape[1] + 1))
-    jacobian[:, 0] = n @ n[0]
-    jacobian[:, 1:] = n[:, :1] * along_x + n[:, 1:] * along_y
+    step = curve.s[1] - curve.s[0]
+    jacobian = np.empty((len(curve.s), basis_mid.shape[1] + 1))
+    _fill_jacobian(basis_mid @ coefficients, curve.normals, basis_mid, step, jacobian)
     return jacobian
 
 
+@njit(cache=True)
+def _fill_jacobian(
+    mid: Array, normals: Array, basis_mid: Array, step: float, jacobian: Array
+) -> None:
+    stations, count = basis_mid.shape
+    along = np.zeros((count, 2))
+    for i in range(stations + 1):
+        jacobian[i, 0] = normals[i, 0] * normals[0, 0] + normals[i, 1] * normals[0, 1]
+        for k in range(count):
+            jacobian[i, k + 1] = (
+                normals[i, 0] * along[k, 0] + normals[i, 1] * along[k, 1]
+            )
+        if i < stations:
+            x, y = -step * np.sin(mid[i]), step * np.cos(mid[i])
+            for k in range(count):
+                value = basis_mid[i, k]
+                if value != 0.0:
+                    along[k, 0] += x * value
+                    along[k, 1] += y * value
+
+
 def _solve(
-    jacobian: Array, residual: Array, weight: Array, penalty: Array, coefficients: Array
-) -> _System:
+    jacobian: Array, residual: Array, weight: Array, penalty: Array,
+    coefficients: Array, strength: float | None,
+) -> _System:  # fmt: skip
     """Solve for the change, with the most likely weight of the penalty (REML).
 
-    Neighbouring residuals share pixels, so `_SHARED` of them count as one.
+    Neighbouring residuals share pixels, so `_SHARED` of them count as one. One
+    eigenproblem serves every weight: with normal = L L^T and L^-1 P L^-T = U d U^T,
+    normal + w P = (L U) (1 + w d) (L U)^T.
     """
     weighted = jacobian * weight[:, None]
     normal = weighted.T @ jacobian / _SHARED
@@ -304,30 +362,46 @@ def _solve(
     size = len(right)
     full = np.zeros((size, size))
     full[1:, 1:] = penalty
-    bend = np.zeros(size)
-    bend[1:] = coefficients
-    total = float(np.sum(weight * residual**2)) / _SHARED
-    count = float(np.count_nonzero(weight)) / _SHARED
-    rank = size - 3
-    scale = np.trace(normal) / np.trace(full)
-    tiny = 1e-12 * np.trace(normal) / size * np.eye(size)
-    best = (np.inf, scale)
-    for strength in scale * 10.0 ** np.arange(-12.0, 3.0, 0.5):
-        pull = full @ bend
-        lower = np.linalg.cholesky(normal + strength * full + tiny)
-        half = np.linalg.solve(lower, right - strength * pull)
-        left = total + strength * float(bend @ pull) - float(half @ half)
-        if left <= 0.0:
-            continue
-        score = max(count - 3.0, 1.0) * np.log(left) - rank * np.log(strength)
-        score += 2.0 * float(np.sum(np.log(np.diag(lower))))
-        if score < best[0]:
-            best = (score, float(strength))
-    lower = np.linalg.cholesky(normal + best[1] * full + tiny)
-    root = np.linalg.inv(lower).T
-    change = root @ (root.T @ (right - best[1] * full @ bend))
-    freedom = float(np.sum((normal @ root) * root))
-    return _System(change, root, freedom)
+    pull = np.zeros(size)
+    pull[1:] = penalty @ coefficients
+    scale = float(np.trace(normal) / np.trace(full))
+    lower = np.linalg.cholesky(normal + 1e-9 * scale * full + _ridge(normal))
+    inverse = np.linalg.inv(lower)
+    d, u = np.linalg.eigh(inverse @ full @ inverse.T)
+    d = np.maximum(d, 0.0)
+    z = inverse.T @ u
+    force, bend = z.T @ right, z.T @ pull
+    if strength is None:
+        total = float(np.sum(weight * residual**2)) / _SHARED
+        stored = float(coefficients @ pull[1:])
+        count = float(np.count_nonzero(weight)) / _SHARED
+        strength = _most_likely(
+            scale, d, force, bend, total, stored, max(count - 3.0, 1.0)
+        )
+    growth = 1.0 + strength * d
+    root = z / np.sqrt(growth)
+    change = z @ ((force - strength * bend) / growth)
+    return _System(change, root, float(np.sum(1.0 / growth)), strength)
+
+
+def _ridge(normal: Array) -> Array:
+    """Keep parts of the rod without data from making the matrix singular."""
+    size = len(normal)
+    return np.asarray(1e-11 * np.trace(normal) / size * np.eye(size))
+
+
+def _most_likely(
+    scale: float, d: Array, force: Array, bend: Array, total: float, stored: float,
+    count: float,
+) -> float:  # fmt: skip
+    """Return the penalty weight of greatest restricted likelihood."""
+    weights = scale * 10.0 ** np.arange(-8.5, 4.0, 0.25)
+    growth = 1.0 + weights[:, None] * d
+    gain = np.sum((force - weights[:, None] * bend) ** 2 / growth, axis=1)
+    left = np.maximum(total + weights * stored - gain, 1e-12 * total + 1e-30)
+    score = count * np.log(left) + np.sum(np.log(growth), axis=1)
+    score -= (len(d) - 3.0) * np.log(weights)
+    return float(weights[int(np.argmin(score))])
 
 
 def _with_covariance(

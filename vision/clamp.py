@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .centreline_fit import Curve
-from .tip import STEP_PX, EndFace, crossing_of, lanes, line_through
+from .tip import STEP_PX, EndFace, crossings_of, lanes, line_through
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -86,14 +86,12 @@ def _face(
     contrast: float, reach: float, sign: float,
 ) -> EndFace | None:  # fmt: skip
     across = np.linspace(-0.3, 0.3, _LANES) * width
-    light = lanes(grey, curve, s, across, sign)[:, ::-1]
-    mean = np.nanmean(light, axis=0)
+    light = np.ascontiguousarray(lanes(grey, curve, s, across, sign)[:, ::-1])
+    mean = light.mean(axis=0)
     place = _steepest(mean, -s[::-1], -expected, reach, 0.12 * contrast)
     if place is None:
         return None
-    crossing = np.array(
-        [crossing_of(row, -s[::-1], place, near, 5.0, 3.0, reach=4.0) for row in light]
-    )
+    crossing = crossings_of(light, -s[::-1], place, near, 5.0, 3.0, reach=4.0)
     line = line_through(across, crossing)
     return None if line is None else _turned(line)
 
@@ -106,13 +104,11 @@ def _front(
     crossings, offsets = [], []
     for across in (-beside[::-1], beside):
         light = lanes(grey, curve, s, across, sign)
-        mean = np.nanmean(light, axis=0)
+        mean = light.mean(axis=0)
         place = _steepest(mean, s, expected, reach, 0.15 * contrast)
         if place is None:
             continue
-        crossings.extend(
-            crossing_of(row, s, place, near, 5.0, 3.0, reach=4.0) for row in light
-        )
+        crossings.extend(crossings_of(light, s, place, near, 5.0, 3.0, reach=4.0))
         offsets.extend(across)
     if len(offsets) < _LANES:
         return None

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from .centreline_fit import Curve
@@ -121,12 +122,10 @@ def find_tip(
     )
     across = middle + np.linspace(-0.5, 0.5, _LANES) * _SHARE * width
     light = lanes(grey, curve, s, across, sign)
-    place = _rough_end(np.nanmean(light[3:-3], axis=0), s, expected, reach, near, inner)
+    place = _rough_end(light[3:-3].mean(axis=0), s, expected, reach, near, inner)
     if place is None:
         return None
-    crossing = np.full(_LANES, np.nan)
-    for k, row in enumerate(light):
-        crossing[k] = crossing_of(row, s, place, near, inner, outer, reach=0.5 * width)
+    crossing = crossings_of(light, s, place, near, inner, outer, reach=0.5 * width)
     return line_through(across - middle, crossing)
 
 
@@ -136,7 +135,9 @@ def line_through(across: Array, crossing: Array) -> EndFace | None:
     if good.sum() < 0.5 * len(crossing):
         return None
     for _ in range(3):
-        slope, place = np.polyfit(across[good], crossing[good], 1)
+        x, y = across[good], crossing[good]
+        slope = float((x - x.mean()) @ y / ((x - x.mean()) @ x))
+        place = float(y.mean() - slope * x.mean())
         residual = crossing - place - slope * across
         spread = 1.4826 * np.nanmedian(np.abs(residual[good])) + 0.02
         kept = np.isfinite(crossing) & (np.abs(residual) < 3.5 * spread)
@@ -171,31 +172,72 @@ def _rough_end(
     return float(s[hits[0]]) if hits.size else None
 
 
-def crossing_of(
-    row: Array, s: Array, place: float, near: float, inner: float, outer: float,
+def crossings_of(
+    light: Array, s: Array, place: float, near: float, inner: float, outer: float,
     *, reach: float,
-) -> float:  # fmt: skip
-    """Return where a lane crosses half level near `place`, going outwards (s rising).
+) -> Array:  # fmt: skip
+    """Return where lanes cross half level near `place`, going outwards (s rising).
 
-    The level beyond is a straight line carried to the edge, as beside the rod.
+    Parameters
+    ----------
+    light : ndarray, shape (k, m)
+        Lanes, as from `lanes`.
+    s : ndarray, shape (m,)
+        Even grid of arc length.
+    place, reach : float
+        Where to look, and how far to either side.
+    near, inner, outer : float
+        Levels are means over `inner` before and `outer` behind, `near` px clear of
+        `place`.
+
+    Returns
+    -------
+    ndarray, shape (k,)
+        NaN where a lane does not cross.
     """
-    inside = (s >= place - near - inner) & (s <= place - near) & np.isfinite(row)
-    beyond = (s >= place + near) & (s <= place + near + outer) & np.isfinite(row)
-    if inside.sum() < 3 or beyond.sum() < 3:
-        return float("nan")
-    low = float(np.mean(row[inside]))
-    high = float(np.mean(row[beyond]))
-    if not high > low:
-        return float("nan")
-    level = 0.5 * (low + high)
-    rises = np.flatnonzero((row[:-1] < level) & (row[1:] >= level))
-    rises = rises[(np.abs(s[rises] - place) <= reach)]
-    if rises.size == 0:
-        return float("nan")
-    k = int(rises[np.argmin(np.abs(s[rises] - place))])
-    first, last = max(k - 1, 0), min(k + 3, len(s))
-    slope, base = np.polyfit(s[first:last] - s[k], row[first:last], 1)
-    at = float(s[k] + (level - base) / slope) if slope > 0.0 else float("nan")
-    if not abs(at - s[k] - 0.5 * STEP_PX) <= 2.0 * STEP_PX:
-        at = float(s[k] + STEP_PX * (level - row[k]) / (row[k + 1] - row[k]))
-    return at
+    out = np.full(len(light), np.nan)
+    step = float(s[1] - s[0])
+    _cross_lanes(light, (place - s[0]) / step, near / step, inner / step, outer / step,
+                 reach / step, out)  # fmt: skip
+    return np.asarray(s[0] + step * out)
+
+
+@njit(cache=True)
+def _cross_lanes(
+    light: Array, place: float, near: float, inner: float, outer: float, reach: float,
+    out: Array,
+) -> None:  # fmt: skip
+    """Everything in samples."""
+    count, columns = light.shape
+    for i in range(count):
+        low = _mean(light, i, place - near - inner, place - near)
+        high = _mean(light, i, place + near, place + near + outer)
+        if not high > low:
+            continue
+        level = 0.5 * (low + high)
+        best = -1
+        for k in range(columns - 1):
+            if light[i, k] < level <= light[i, k + 1] and abs(k + 0.5 - place) <= reach:
+                if best < 0 or abs(k + 0.5 - place) < abs(best + 0.5 - place):
+                    best = k
+        if best < 1 or best + 2 >= columns:
+            continue
+        a, b = light[i, best - 1], light[i, best]
+        c, d = light[i, best + 1], light[i, best + 2]
+        slope = 0.3 * (d - a) + 0.1 * (c - b)
+        at = best + (level - b) / (c - b)
+        if slope > 0.0:
+            line = best + 0.5 + (level - 0.25 * (a + b + c + d)) / slope
+            if abs(line - best - 0.5) <= 1.0:
+                at = line
+        out[i] = at
+
+
+@njit(cache=True)
+def _mean(light: Array, i: int, first: float, last: float) -> float:
+    total, number = 0.0, 0
+    for k in range(max(int(np.ceil(first)), 0), min(int(last), light.shape[1] - 1) + 1):
+        if np.isfinite(light[i, k]):
+            total += light[i, k]
+            number += 1
+    return total / number if number >= 3 else np.nan

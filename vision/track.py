@@ -58,9 +58,10 @@ def start_curve(
     Start or None
         None where no two edges are seen along most of the curve.
     """
-    curve = smooth_curve(points, spacing=2.0 * width)
+    _, along, theta = _resample(points, 0.6 * width)
+    normals = np.column_stack([-np.sin(theta), np.cos(theta)])
     low, high, level = rough_edges(
-        grey, curve.points, curve.normals, reach=0.5 * width + 6.0, sign=sign
+        grey, along, normals, reach=0.5 * width + 6.0, sign=sign
     )
     across = high - low
     found = np.isfinite(across) & (across > 1.0)
@@ -70,7 +71,7 @@ def start_curve(
     good = found & (np.abs(across - real) < 0.3 * real + 1.0)
     if good.sum() < 0.5 * len(across):
         return None
-    centre = curve.points + (0.5 * (low + high))[:, None] * curve.normals
+    centre = along + (0.5 * (low + high))[:, None] * normals
     centres = centre[good][:: max(1, int(0.4 * real))]
     if follow:
         centres = _follow(grey, centres[2:], real, sign, level)
@@ -79,24 +80,25 @@ def start_curve(
 
 def smooth_curve(points: Array, *, spacing: float) -> Curve:
     """Fit a curve to a coarse polyline, on an even grid of about 1 px."""
-    steps = np.hypot(*np.diff(points, axis=0).T)
-    keep = np.concatenate([[True], steps > 1e-6])
-    points = points[keep]
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    count = max(int(along[-1]), 16)
-    s = np.linspace(0.0, along[-1], count + 1)
-    even = np.column_stack([np.interp(s, along, points[:, k]) for k in (0, 1)])
-    window = max(1, int(0.25 * spacing))
-    chord = np.empty_like(even)
-    index = np.arange(len(s))
-    ahead = np.minimum(index + window, len(s) - 1)
-    behind = np.maximum(index - window, 0)
-    chord = even[ahead] - even[behind]
-    theta = np.unwrap(np.arctan2(chord[:, 1], chord[:, 0]))
+    s, even, theta = _resample(points, 0.25 * spacing)
     fit = fit_curve(
-        s, even, np.ones(len(s)), spacing=spacing, iterations=3, theta=theta
-    )
+        s, even, np.ones(len(s)), spacing=spacing, iterations=2, theta=theta,
+        stiffness=spacing**3,
+    )  # fmt: skip
     return fit.curve
+
+
+def _resample(points: Array, window: float) -> tuple[Array, Array, Array]:
+    """Return arc length, points and smoothed tangent angles on an even grid."""
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    points = points[np.concatenate([[True], steps > 1e-6])]
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    s = np.linspace(0.0, along[-1], max(int(along[-1]), 16) + 1)
+    even = np.column_stack([np.interp(s, along, points[:, k]) for k in (0, 1)])
+    index, reach = np.arange(len(s)), max(1, int(window))
+    chord = even[np.minimum(index + reach, len(s) - 1)]
+    chord = chord - even[np.maximum(index - reach, 0)]
+    return s, even, np.unwrap(np.arctan2(chord[:, 1], chord[:, 0]))
 
 
 def _follow(
