@@ -1,0 +1,223 @@
+"""``magbend vision``: from a board's photograph to tables, and every wrong turn."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from magbend.cli import main as cli
+from magbend.vision.calibration import Calibration
+from magbend.vision.score import signed_distance
+from magbend.vision.tables import read_centrelines, read_frames, to_centreline
+
+FIXTURES = Path(__file__).parents[2] / "fixtures" / "vision"
+RENDERED = FIXTURES / "rendered"
+BOARD = RENDERED / "calib_D.jpg"
+
+
+@pytest.fixture
+def magbend(monkeypatch, capsys):
+    """Run the command in this process; return exit code, output and messages."""
+
+    def run(*words: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["magbend", *map(str, words)])
+        try:
+            cli.main()
+            code = 0
+        except SystemExit as stop:
+            code = int(stop.code or 0)
+        out, messages = capsys.readouterr()
+        assert "Traceback" not in messages
+        return code, out, messages
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def calibration(tmp_path_factory) -> Path:
+    from magbend.vision.board import Board
+    from magbend.vision.calibrate import calibrate
+    from magbend.vision.photo import read_photo
+
+    path = tmp_path_factory.mktemp("camera") / "calibration.json"
+    calibrate(read_photo(BOARD), board=Board()).save(path)
+    return path
+
+
+def test_board_is_written(magbend, tmp_path):
+    code, out, _ = magbend("vision", "board", "--out", tmp_path / "new" / "board.pdf")
+    assert code == 0
+    assert "70 x 50 mm" in out
+    assert (tmp_path / "new" / "board.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_calibrate_tells_and_writes(magbend, tmp_path):
+    path = tmp_path / "calibration.json"
+    code, out, _ = magbend(
+        "vision", "calibrate", BOARD, "--out", path, "--rod-height-mm", 0.9
+    )
+    assert code == 0
+    assert "24 corners" in out
+    assert "+-" in out
+    camera = Calibration.load(path)
+    assert camera.rod_height_mm == 0.9
+    assert camera.mm_per_px((800.0, 600.0), height_mm=0.0) == pytest.approx(
+        0.04879, rel=1e-3
+    )
+
+
+def test_calibrate_as_json(magbend, tmp_path):
+    code, out, _ = magbend(
+        "vision", "calibrate", BOARD, "--out", tmp_path / "c.json", "--json",
+        "--camera-height-mm", 330,
+    )  # fmt: skip
+    facts = json.loads(out)
+    assert code == 0
+    assert facts["camera_height_source"] == "given"
+    assert facts["views"][0]["used"] is True
+
+
+def test_calibrate_from_a_known_length(magbend, tmp_path):
+    path = tmp_path / "c.json"
+    code, out, _ = magbend(
+        "vision", "calibrate", RENDERED / "dev_10.jpg", "--out", path,
+        "--known-length", "205,900 1438,900 60",
+    )  # fmt: skip
+    assert code == 0
+    assert "no correction for height" in out
+    scale = Calibration.load(path).mm_per_px((800.0, 600.0), height_mm=0.0)
+    assert scale == pytest.approx(60.0 / 1233.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("stem", ["dev_03", "dev_05", "dev_07", "dev_10", "dev_12"])
+def test_rendered_photograph_is_measured_in_mm(magbend, tmp_path, calibration, stem):
+    """The promise of the first issue: under 0.10 mm RMS, clamp-aligned, every frame."""
+    truth = json.loads((RENDERED / f"{stem}.json").read_text())
+    code, _, _ = magbend(
+        "vision", "extract", RENDERED / f"{stem}.jpg", "--calibration", calibration,
+        "--rod-height-mm", truth["axis_height_mm"], "--out", tmp_path, "--no-overlays",
+    )  # fmt: skip
+    assert code == 0
+    (row,) = read_frames(tmp_path / "frames.csv")
+    line = to_centreline(read_centrelines(tmp_path / "centrelines.csv")[row.image])
+    distance = signed_distance(line.points_mm, np.array(truth["centreline_mm"]))
+    assert np.sqrt(np.mean(distance**2)) < 0.10
+    assert row.width_mm == pytest.approx(truth["side_mm"], abs=0.02)
+    assert row.length_mm == pytest.approx(truth["length_mm"], abs=0.10)
+
+
+def test_board_photograph_is_refused_as_a_bench_photograph(
+    magbend, tmp_path, calibration
+):
+    code, _, messages = magbend(
+        "vision", "extract", BOARD, "--calibration", calibration, "--out", tmp_path
+    )
+    assert code == 1
+    assert "none of the 1 photographs could be measured" in messages
+    (row,) = read_frames(tmp_path / "frames.csv")
+    assert row.status == "failed"
+    assert row.reason
+    assert (tmp_path / "overlays" / "calib_D.png").exists()
+
+
+def test_one_refusal_among_good_ones_is_no_failure(magbend, tmp_path, calibration):
+    code, out, messages = magbend(
+        "vision", "extract", BOARD, RENDERED / "dev_12.jpg", "--calibration",
+        calibration, "--out", tmp_path, "--no-overlays", "--json",
+    )  # fmt: skip
+    assert code == 0
+    facts = json.loads(out)
+    assert (facts["measured"], facts["failed"]) == (1, 1)
+    assert [frame["status"] for frame in facts["frames"]] == ["failed", "ok"]
+    assert facts["frames"][0]["length_mm"] is None
+    assert "photographs" in messages
+
+
+@pytest.mark.parametrize("name", ["acrylic_20_1.jpg", "acrylic_25_1.jpg"])
+def test_yarn_is_measured_light_on_dark(magbend, tmp_path, name):
+    code, _, _ = magbend(
+        "vision", "extract", FIXTURES / "yarn" / name, "--out", tmp_path
+    )
+    assert code == 0
+    (row,) = read_frames(tmp_path / "frames.csv")
+    assert "uncalibrated" in row.flags
+    assert row.clamp_px[0] < 60.0  # the yarn leaves the left border ...
+    assert row.tip_px[1] > row.clamp_px[1] + 1000.0  # ... and hangs down
+
+
+def test_figure_and_edges_are_written(magbend, tmp_path, calibration):
+    code, _, _ = magbend(
+        "vision", "extract", RENDERED / "dev_12.jpg", "--calibration", calibration,
+        "--out", tmp_path, "--figure-steps", tmp_path / "f" / "steps.pdf",
+        "--edges", tmp_path / "e" / "edges.csv",
+    )  # fmt: skip
+    assert code == 0
+    assert (tmp_path / "f" / "steps.pdf").read_bytes().startswith(b"%PDF")
+    assert len((tmp_path / "e" / "edges.csv").read_text().splitlines()) > 100
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "sentence"),
+    [
+        (["board"], 2, "Missing option"),
+        (["board", "--out", "x.doc"], 1, ".pdf or .png"),
+        (["board", "--out", "x.pdf", "--board", "seven"], 1, "such as 7x5"),
+        (["board", "--out", "x.pdf", "--board", "7x4"], 1, "odd number of rows"),
+        (["calibrate", "none.png", "--out", "c.json"], 1, "none.png"),
+        (["calibrate", BOARD, "--out", "c.json", "--board", "5x5"], 1, "no board"),
+        (["calibrate", BOARD, "--out", "c", "--print-scale", "2"], 1, "print_scale"),
+        (["calibrate", BOARD, "--out", "c.json", "--focal-px", "-3"], 1, "focal_px"),
+        (["calibrate", BOARD, "--out", "c.json", "--known-length", "1 2"], 1, "X1,Y1"),
+        (["calibrate", BOARD, "--out", "c.json", "--scale-mm-per-px", "0"], 1, "above"),
+        (["extract", "none.png"], 1, "none.png"),
+        (["extract", BOARD, "--calibration", "none.json"], 1, "none.json"),
+        (["extract", BOARD, "--joints-mm", "a,b"], 1, "--joints-mm"),
+        (["extract", BOARD, "--rod-height-mm", "nan"], 1, "--rod-height-mm"),
+        (["extract", BOARD, "--figure-steps", "x.doc"], 1, ".pdf"),
+        (["extract", BOARD, "--bare", "none.png"], 1, "none.png"),
+        (["extract"], 2, "Missing argument"),
+        (["extract", BOARD, "--wrong"], 2, "No such option"),
+    ],
+)  # fmt: skip
+def test_mistakes_end_in_one_sentence(
+    magbend, tmp_path, monkeypatch, words, code, sentence
+):
+    monkeypatch.chdir(tmp_path)
+    got, _, messages = magbend("vision", *words)
+    assert got == code
+    assert sentence in messages
+    if code == 1:
+        assert len(messages.strip().splitlines()) == 1
+    assert not list(tmp_path.glob("*")), "nothing may be left behind"
+
+
+def test_calibration_of_another_camera_is_named(magbend, tmp_path, calibration):
+    yarn = FIXTURES / "yarn" / "acrylic_20_1.jpg"
+    code, _, messages = magbend(
+        "vision", "extract", yarn, "--calibration", calibration, "--out", tmp_path
+    )
+    assert code == 1
+    assert "1600 x 1200" in messages
+    (row,) = read_frames(tmp_path / "frames.csv")
+    assert "calibration_mismatch" in row.flags
+
+
+def test_help_names_an_example_and_loads_nothing_heavy():
+    program = (
+        "import sys; sys.argv = ['magbend', 'vision', 'extract', '--help']\n"
+        "from magbend.cli.main import main\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        "heavy = {'numpy', 'scipy', 'cv2', 'numba', 'pandas', 'matplotlib', 'rich',"
+        " 'pydantic'} & set(sys.modules)\n"
+        "assert not heavy, heavy\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Example: magbend vision extract" in done.stdout
