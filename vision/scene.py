@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import cv2
 import numpy as np
@@ -32,6 +33,9 @@ BLUE: Colour = (0.42, 0.13, 0.05)
 BLACK: Colour = (0.045, 0.045, 0.045)
 PAPER: Colour = (0.70, 0.71, 0.71)
 RUBBER: Colour = (0.048, 0.048, 0.048)
+
+_MOSAIC = 0.6
+"""Noise that three channels share, over the noise of one alone: about 1/sqrt(3)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -276,8 +280,13 @@ def render_board(
 
 def _paper(scene: Scene, camera: Calibration) -> Picture:
     """Return the empty paper: fibres, specks, and the light that falls on it."""
-    width, height = camera.image_size_px
-    rng = np.random.default_rng(scene.paper_seed)
+    size = camera.image_size_px
+    return _sheet(scene.paper_seed, scene.dust, scene.light, *size).copy()
+
+
+@lru_cache(maxsize=2)
+def _sheet(seed: int, dust: int, light: SceneLight, width: int, height: int) -> Picture:
+    rng = np.random.default_rng(seed)
     texture = np.ones((height, width), dtype=np.float32)
     for cell_px, amount in ((6, 0.004), (24, 0.006), (120, 0.008)):
         shape = (height // cell_px + 3, width // cell_px + 3)
@@ -285,7 +294,7 @@ def _paper(scene: Scene, camera: Calibration) -> Picture:
         texture += amount * cv2.resize(
             coarse, (width, height), interpolation=cv2.INTER_CUBIC
         )
-    for _ in range(scene.dust):
+    for _ in range(dust):
         x, y = rng.uniform(size=2) * (width, height)
         radius = rng.uniform(0.4, 1.6)
         angle = np.linspace(0.0, 2.0 * np.pi, 13)[:-1]
@@ -293,7 +302,7 @@ def _paper(scene: Scene, camera: Calibration) -> Picture:
             [x + radius * np.cos(angle), y + radius * np.sin(angle)]
         )
         texture *= 1.0 - 0.7 * coverage(speck, width, height)
-    texture *= _lamps(scene.light, width, height)
+    texture *= _lamps(light, width, height)
     return np.asarray(texture[..., None] * np.array(PAPER, dtype=np.float32))
 
 
@@ -412,11 +421,17 @@ def _draw_gloss(
 def expose(
     picture: Picture, light: SceneLight, rng: np.random.Generator
 ) -> NDArray[np.uint8]:
-    """Blur, add the noise of light (its root) and of the sensor, and encode."""
-    blurred = cv2.GaussianBlur(picture, (0, 0), light.blur_px)
-    noise = rng.standard_normal(picture.shape, dtype=np.float32)
-    sd = light.noise * np.sqrt(np.maximum(blurred, 0.02) / np.float32(PAPER[0]))
-    return encode_srgb(np.asarray(blurred + sd * noise, dtype=np.float32))
+    """Blur, add the noise of light (its root) and of the sensor, and encode.
+
+    The noise is that of a colour mosaic: after its interpolation the three channels of
+    a pixel rise and fall together.
+    """
+    blurred = np.asarray(cv2.GaussianBlur(picture, (0, 0), light.blur_px))
+    green = np.maximum(blurred[..., 1], np.float32(0.02)) / np.float32(PAPER[1])
+    noise = rng.standard_normal(green.shape, dtype=np.float32)
+    noise *= np.float32(_MOSAIC * light.noise) * np.sqrt(green)
+    blurred += noise[..., None]
+    return encode_srgb(blurred)
 
 
 def _paint(picture: Picture, mask: Picture, colour: Colour) -> None:

@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 
 def encode_srgb(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
     """Return linear light from 0 to 1 as 8-bit sRGB; what lies outside is cut."""
-    index = np.clip(linear, 0.0, 1.0) * np.float32(len(_TABLE) - 1) + np.float32(0.5)
-    return np.asarray(_TABLE[index.astype(np.int32)])
+    index = linear * np.float32(len(_TABLE) - 1)
+    index += np.float32(0.5)
+    np.clip(index, 0, len(_TABLE) - 1, out=index)
+    return np.asarray(np.take(_TABLE, index.astype(np.uint16)))
 
 
 def _table() -> NDArray[np.uint8]:
