@@ -56,8 +56,9 @@ class _Drawing:
     def add(self, name: str, figure: Figure | None) -> str:
         if figure is None:
             return ""
+        svg = to_svg(figure, name)
         self.pdfs[f"{name}.pdf"] = to_pdf(figure)
-        return to_svg(figure, name)
+        return svg
 
 
 def write_report(

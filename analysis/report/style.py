@@ -44,7 +44,6 @@ _RC = {
     "font.family": "sans-serif",
     "font.size": 8.0,
     "axes.titlesize": 8.5,
-    "axes.titleweight": "bold",
     "axes.titlelocation": "left",
     "axes.edgecolor": FAINT,
     "axes.labelcolor": INK,
@@ -112,6 +111,8 @@ def to_svg(figure: Figure, name: str) -> str:
     buffer = io.StringIO()
     with drawing():
         figure.savefig(buffer, format="svg", metadata={"Date": None})
+        # Laid out once is enough: the PDF of the same figure comes next.
+        figure.set_layout_engine("none")
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>\s*", "", text, flags=re.DOTALL)
