@@ -26,6 +26,9 @@ from .twin import TwinBench
 
 Tell = Callable[[str], None]
 
+SWING = {"swing_mm": 1.0, "swing_Hz": 2.0, "damping_s": 0.4}
+"""How the twin's rod swings after the stage arrived."""
+
 DEMO_FILES = {
     "gmc2.toml": """\
 # GMC 2 of the paper's Table 1: three sections that soften from root to tip.
@@ -147,7 +150,9 @@ def _free_name(out: Path) -> Path:
 def _experiment(
     plan: Plan, bench: TwinBench, folder: Path, *, seed: int, tell: Tell
 ) -> None:
-    devices = open_twin(plan.rig, bench.photograph, bench.flux_mT, seed=seed)
+    devices = open_twin(
+        plan.rig, bench.photograph, bench.flux_mT, seed=seed, camera=SWING
+    )
     with closing_all(devices):
         summary = run(plan, devices, folder, twin=True)
     if summary.status != "success":
