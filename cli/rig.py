@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from . import rig_run, rig_stage
 from .console import group
 
 app = group(
@@ -9,3 +10,5 @@ app = group(
     "Drive the bench: stage, camera, Tesla-meter, runs.",
     "magbend rig run plan.toml --out runs/gmc2",
 )
+rig_stage.register(app)
+rig_run.register(app)

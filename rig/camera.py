@@ -69,6 +69,31 @@ class Camera(Protocol):
         ...
 
 
+class NoCamera:
+    """No camera: for work in which no picture is taken."""
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Return that there is none."""
+        return {"backend": "none"}
+
+    def at_step(self, index: int, gap_mm: float) -> None:
+        """Do nothing."""
+
+    def grab_after(self, time_s: float) -> Frame:
+        """Refuse.
+
+        Raises
+        ------
+        CameraError
+            Always.
+        """
+        raise CameraError("there is no camera here, and a picture was asked for")
+
+    def close(self) -> None:
+        """Do nothing."""
+
+
 def grab_median(camera: Camera, clock: Clock, frames: int) -> Frame:
     """Return the pixel-wise median of `frames` successive new pictures.
 

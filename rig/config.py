@@ -51,7 +51,7 @@ class SettleConfig(FileModel):
     """The ``[settle]`` table: when the rod counts as still."""
 
     time_s: NonNegativeFloat = 2.0
-    image_change_percent: PositiveFloat = 0.05
+    image_change_percent: PositiveFloat = 0.02
     frames: int = Field(default=5, ge=2)
     window_s: NonNegativeFloat = 0.5
     timeout_s: PositiveFloat = 30.0

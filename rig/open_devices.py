@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from ..core.errors import CameraError, ConfigError, MeterError
-from .camera import Camera
+from .camera import Camera, NoCamera
 from .capture import CaptureCamera, Source
 from .clock import Clock
-from .config import CameraConfig, MeterConfig
+from .config import CameraConfig, MeterConfig, Plan, RigModel
+from .devices import Devices
+from .gap_stage import GapStage
 from .link import WireLog
 from .meter import ManualMeter, Meter, NoMeter
 
@@ -149,3 +152,61 @@ def open_meter(
     return SerialMeter(
         description, config.port, zero_mT=config.zero_mT, sign=config.sign, tap=tap
     )
+
+
+def open_stage(rig: RigModel, clock: Clock, *, log: WireLog | None = None) -> GapStage:
+    """Open and connect the stage of a rig file; nothing moves.
+
+    Raises
+    ------
+    StageError
+        If nobody answers, or a setting of the controller does not fit the rig file.
+    """
+    from .stages import make_stage
+
+    stage = GapStage(
+        make_stage(rig.stage, clock, log=log), rig.stage, rig.limits, clock
+    )
+    stage.connect()
+    return stage
+
+
+def open_devices(
+    plan: Plan,
+    clock: Clock,
+    *,
+    log: WireLog | None = None,
+    readings_mT: Mapping[float, float] | None = None,
+    with_camera: bool = True,
+) -> Devices:
+    """Open every device that a plan needs, or none.
+
+    Parameters
+    ----------
+    plan : Plan
+        The plan with its rig.
+    clock : Clock
+        Time; `SystemClock` on hardware.
+    log : WireLog, optional
+        Where every byte is recorded.
+    readings_mT : mapping of float to float, optional
+        Typed readings that replace the meter.
+    with_camera : bool
+        False where no picture is taken (scan-field).
+
+    Raises
+    ------
+    RigError
+        If one of them cannot be opened; those that were open are closed again.
+    """
+    folder = plan.rig_path.parent
+    with contextlib.ExitStack() as opened:
+        stage = open_stage(plan.rig, clock, log=log)
+        opened.callback(stage.close)
+        meter = open_meter(plan.rig.meter, folder, readings_mT=readings_mT, log=log)
+        opened.callback(meter.close)
+        camera: Camera = NoCamera()
+        if with_camera:
+            camera = open_camera(plan.rig.camera, folder, clock)
+        opened.pop_all()
+    return Devices(stage=stage, camera=camera, meter=meter, clock=clock)

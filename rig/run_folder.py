@@ -147,7 +147,8 @@ class RunFolder:
         StoreError
             If it cannot be written; the run then counts as cut off.
         """
-        names = (RUN_FILE, PLAN_FILE, STEPS_FILE, SESSIONS_FILE, WIRE_FILE)
+        # Not the wire log: closing the devices is still written to it.
+        names = (RUN_FILE, PLAN_FILE, STEPS_FILE, SESSIONS_FILE)
         with _interrupts_later(), _store_errors(self.path):
             end = {
                 "status": status,

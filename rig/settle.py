@@ -2,7 +2,7 @@
 
 Two pictures are compared after a two-by-two binning: what counts is the share of
 pixels that changed by more than the noise of the difference itself (its median
-absolute deviation, six times over) and by more than 2.5 % of full scale. A thin rod
+absolute deviation, six times over) and by more than 4 % of full scale. A thin rod
 that moves by a tenth of a pixel changes that share; camera noise and a lamp that
 breathes do not.
 
@@ -22,7 +22,7 @@ from .camera import Camera, Frame, Image
 from .clock import Clock
 from .config import SettleConfig
 
-_FLOOR = 0.025
+_FLOOR = 0.04
 _NOISES = 6.0
 
 

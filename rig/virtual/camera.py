@@ -14,7 +14,7 @@ CameraFault = Literal["stall", "dark"]
 Render = Callable[[float, float], Image]
 """``render(gap_mm, time_s)`` returns the picture at that gap and time."""
 
-_STILL_MM = 1e-4
+_STILL_MM = 0.02
 
 
 class VirtualCamera:

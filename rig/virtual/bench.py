@@ -1,0 +1,86 @@
+"""A whole bench of virtual devices: the real drivers on a twin board, camera, meter."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Mapping
+from typing import Any
+
+from ..clock import Clock, SteppedClock
+from ..config import RigModel
+from ..devices import Devices
+from ..gap_stage import GapStage
+from ..grbl import GrblStage
+from ..link import WireLog
+from .camera import Render, VirtualCamera
+from .grbl_board import GrblBoard
+from .meter import FluxAt, VirtualMeter
+from .plant import Plant
+from .protocol_twin import register_board
+
+# Homing, hard and soft limits on, motors always on, reports with the buffer state.
+_BOARD_SETTINGS = {1: 255, 10: 3, 20: 1, 21: 1, 22: 1, 130: 180, 120: 50}
+
+
+def twin_board(*, backlash_mm: float = 0.0) -> GrblBoard:
+    """Return a board with homing switches whose machine zero is the switch."""
+    plant = Plant(switch_high_mm=0.0, backlash_mm=backlash_mm)
+    return GrblBoard(plant, dict(_BOARD_SETTINGS))
+
+
+def open_twin(
+    rig: RigModel,
+    render: Render,
+    flux: FluxAt,
+    *,
+    seed: int = 0,
+    clock: Clock | None = None,
+    board: GrblBoard | None = None,
+    log: WireLog | None = None,
+    camera: Mapping[str, Any] | None = None,
+    meter: Mapping[str, Any] | None = None,
+) -> Devices:
+    """Open the twin of a bench: the stage is connected, nothing has moved.
+
+    The stage driver is the one of the hardware; it talks to a simulated GRBL board. The
+    camera and the meter look at where the simulated carriage truly is.
+
+    Parameters
+    ----------
+    rig : RigModel
+        The rig file; its port, camera source and meter port are not used.
+    render : callable
+        ``render(gap_mm, time_s)`` returns the photograph.
+    flux : callable
+        ``flux(gap_mm)`` returns the flux density in mT at the probe.
+    seed : int
+        Of the meter's noise.
+    clock : Clock, optional
+        By default one that only steps: a run takes as long as it computes.
+    board : GrblBoard, optional
+        By default `twin_board`.
+    log : WireLog, optional
+        Where every byte is recorded.
+    camera, meter : mapping, optional
+        Options of `VirtualCamera` (swing, faults) and `VirtualMeter` (noise, overload).
+
+    Returns
+    -------
+    Devices
+        Close them when done.
+    """
+    clock = clock or SteppedClock()
+    board = board or twin_board()
+    url = register_board(f"bench-{id(board):x}", board, clock)
+    config = rig.stage.model_copy(update={"driver": "grbl", "port": url})
+    stage = GapStage(GrblStage(config, clock, log=log), config, rig.limits, clock)
+    axis = "XYZ".index(config.axis)
+
+    def gap_mm() -> float:
+        return stage.to_gap_mm(board.plant.carriage_mm[axis])
+
+    swing: dict[str, Any] = {"swing_mm": 3.0, "swing_Hz": 1.4, "damping_s": 0.4}
+    eye = VirtualCamera(render, gap_mm, clock, **{**swing, **(camera or {})})
+    probe = VirtualMeter(flux, gap_mm, random.Random(seed), **(meter or {}))
+    stage.connect()
+    return Devices(stage=stage, camera=eye, meter=probe, clock=clock)
