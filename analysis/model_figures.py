@@ -11,7 +11,9 @@ from ..core.errors import InputError
 from ..core.files import write_bytes
 
 if TYPE_CHECKING:
+    from .design import Design
     from .expansion_train import TrainingReport
+    from .goals import Goal
 
 SUFFIXES = (".svg", ".pdf", ".png")
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -84,4 +86,27 @@ def training_figure(report: TrainingReport, published_per_mm2: float) -> Any:
         title="What was held out, and how well it was predicted",
     )
     axes.title.set_fontsize(9)
+    return figure
+
+
+def design_figure(designs: list[Design], goal: Goal) -> Any:
+    """Draw each design's shape with the band that fabrication scatter makes of it."""
+    figure = new_figure(150.0, 100.0)
+    axes = figure.add_subplot()
+    for number, one in enumerate(designs):
+        colour = COLOURS[number % len(COLOURS)]
+        low, high = np.quantile(one.band_mm, [0.025, 0.975], axis=0)
+        x = np.concatenate([low[:, 0], high[::-1, 0]])
+        y = np.concatenate([high[:, 1], low[::-1, 1]])
+        axes.fill(x, y, color=colour, alpha=0.15, lw=0)
+        moduli = "-".join(f"{s.E_MPa:.3g}" for s in one.specimen.sections)
+        label = f"{one.specimen.name}: {one.specimen.side_mm:g} mm, {moduli} MPa"
+        axes.plot(*one.shape_mm.T, color=colour, lw=1.4, label=label)
+    if goal.kind == "tip":
+        axes.plot(*goal.wanted, "k+", ms=10, label="wanted")
+    if goal.curve_mm is not None:
+        axes.plot(*goal.curve_mm.T, "k--", lw=1, label="wanted")
+    axes.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
+    axes.set_title(f"{goal.words}; bands: 95 % of what fabrication makes", fontsize=9)
+    axes.legend(fontsize=7, frameon=False)
     return figure

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from . import library
+from . import design, library
 from .console import print_json, progress
 
 
@@ -123,4 +123,5 @@ def register(app: typer.Typer) -> None:
     """Add the commands to ``magbend analysis``."""
     app.command("train", epilog=TRAIN_EXAMPLE)(train)
     app.command("predict", epilog=PREDICT_EXAMPLE)(predict)
+    app.command("design", epilog=design.EXAMPLE)(design.design)
     app.add_typer(library.app, name="library")

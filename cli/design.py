@@ -1,0 +1,228 @@
+"""``magbend analysis design``: from a wanted shape to rods that give it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from .console import print_json
+
+if TYPE_CHECKING:
+    from ..analysis.design import Design
+    from ..analysis.goals import Goal
+    from ..analysis.makeable import Makeable
+    from ..sim import Field
+
+EXAMPLE = "Example: magbend analysis design --radius-mm 100 --field-mT 50 --count 5"
+
+
+def design(
+    radius_mm: float | None = typer.Option(
+        None, "--radius-mm", help="Wanted bending radius: circle through the whole rod."
+    ),
+    tip_mm: tuple[float, float] | None = typer.Option(
+        None, "--tip", help="Wanted tip X Y, mm, clamp at the origin."
+    ),
+    tip_angle_deg: float | None = typer.Option(
+        None, "--tip-angle-deg", "--angle-deg", help="Wanted tangent angle at the tip."
+    ),
+    curve: Path | None = typer.Option(
+        None, "--curve", help="Wanted curve: CSV with x_mm,y_mm from the clamp on."
+    ),
+    polyline: Path | None = typer.Option(
+        None, "--polyline", help="Curve drawn on a photograph: CSV with x_px,y_px."
+    ),
+    calibration: Path | None = typer.Option(
+        None, "--calibration", help="calibration.json of that photograph."
+    ),
+    rod_height_mm: float = typer.Option(
+        0.0, "--rod-height-mm", help="Height of the curve above the board."
+    ),
+    flux_mT: float | None = typer.Option(None, "--field-mT", help="Uniform field, mT."),
+    field_angle_deg: float = typer.Option(
+        90.0, "--field-angle-deg", help="Direction of the uniform field from +x."
+    ),
+    magnet: Path | None = typer.Option(None, "--magnet", help="Magnet file."),
+    gap_mm: float | None = typer.Option(None, "--gap-mm", help="Gap of the magnet."),
+    count: int = typer.Option(5, "--count", help="How many distinct designs."),
+    makeable: Path | None = typer.Option(
+        None, "--makeable", help="What can be made, TOML (docs/library.md)."
+    ),
+    length_mm: str | None = typer.Option(
+        None, "--length-mm", help="Total length, mm: 30 or 25:40 (default 30)."
+    ),
+    side_mm: str | None = typer.Option(
+        None, "--side-mm", help="Side, mm: 1 or 0.75:1.35 (the default)."
+    ),
+    E_MPa: str | None = typer.Option(
+        None, "--E-MPa", help="Moduli, MPa, falling: 8:50 (the default)."
+    ),
+    unit_length_mm: str | None = typer.Option(
+        None, "--unit-length-mm", help="Each section, mm: 5:20 (the default)."
+    ),
+    remanence_mT: float | None = typer.Option(
+        None, "--remanence-mT", help="Remanence (default 20.07, GMC 2)."
+    ),
+    recipes: bool = typer.Option(
+        False, "--recipes", help="Only the paper's materials and moulds."
+    ),
+    seed: int = typer.Option(0, "--seed", min=0, help="Seed of the search."),
+    figure: Path | None = typer.Option(
+        None, "--figure", help="Draw the expected shapes with bands (.svg .pdf .png)."
+    ),
+    out: Path | None = typer.Option(
+        None, "--out", help="Folder for the specimen files design_1.json, ..."
+    ),
+    as_json: bool = typer.Option(False, "--json", help="Print JSON."),
+) -> None:
+    """Find distinct rods that give a wanted shape, ranked by error and tolerance."""
+    from ..analysis import design as designing
+    from ..analysis import model_figures
+
+    if figure is not None:
+        model_figures.check_path(figure)
+    goal = _goal(
+        radius_mm, tip_mm, tip_angle_deg, curve, polyline, calibration, rod_height_mm
+    )
+    field = _field(flux_mT, field_angle_deg, magnet, gap_mm)
+    options = {
+        "total_length_mm": _range(length_mm, "--length-mm"),
+        "side_mm": _range(side_mm, "--side-mm"),
+        "E_MPa": _range(E_MPa, "--E-MPa"),
+        "unit_length_mm": _range(unit_length_mm, "--unit-length-mm"),
+        "remanence_mT": remanence_mT,
+    }
+    limits = _makeable(makeable, options, recipes, goal)
+    found = designing.design(goal, field, limits, count=count, seed=seed)
+    if figure is not None:
+        drawing = model_figures.design_figure(found, goal)
+        model_figures.save_figure(drawing, figure)
+    if out is not None:
+        _write(found, out)
+    if as_json:
+        print_json([designing.as_dict(one, goal) for one in found])
+        return
+    _print(found, goal)
+    if len(found) < count:
+        typer.echo(f"only {len(found)} distinct designs were found", err=True)
+
+
+def _goal(
+    radius_mm: float | None,
+    tip_mm: tuple[float, float] | None,
+    tip_angle_deg: float | None,
+    curve: Path | None,
+    polyline: Path | None,
+    calibration: Path | None,
+    rod_height_mm: float,
+) -> Goal:
+    from ..analysis import goals
+    from ..core.errors import InputError
+
+    given = [radius_mm, tip_mm, tip_angle_deg, curve, polyline]
+    if sum(value is not None for value in given) != 1:
+        raise InputError(
+            "give exactly one of --radius-mm, --tip, --tip-angle-deg, --curve and "
+            "--polyline"
+        )
+    if radius_mm is not None:
+        return goals.radius_goal(radius_mm)
+    if tip_mm is not None:
+        return goals.tip_goal(*tip_mm)
+    if tip_angle_deg is not None:
+        return goals.angle_goal(tip_angle_deg)
+    if curve is not None:
+        return goals.curve_goal(goals.read_points(curve, ("x_mm", "y_mm")))
+    if polyline is None or calibration is None:
+        raise InputError("--polyline needs the --calibration of its photograph")
+    from ..vision import Calibration
+
+    points_px = goals.read_points(polyline, ("x_px", "y_px"))
+    camera = Calibration.load(calibration)
+    points_mm = camera.to_mm(points_px, height_mm=rod_height_mm)
+    return goals.curve_goal(points_mm, align=True)
+
+
+def _field(
+    flux_mT: float | None, angle_deg: float, magnet: Path | None, gap_mm: float | None
+) -> Field:
+    from ..core.errors import InputError
+    from ..core.specimen_file import read_magnet
+    from ..sim import MagnetField, UniformField
+
+    if flux_mT is not None and magnet is None and gap_mm is None:
+        return UniformField(flux_mT=flux_mT, angle_deg=angle_deg)
+    if flux_mT is None and magnet is not None and gap_mm is not None:
+        return MagnetField(magnet=read_magnet(magnet), gap_mm=gap_mm)
+    raise InputError("give either --field-mT, or --magnet and --gap-mm")
+
+
+def _range(text: str | None, option: str) -> tuple[float, float] | None:
+    from ..core.errors import InputError
+
+    if text is None:
+        return None
+    try:
+        ends = [float(part) for part in text.split(":")]
+    except ValueError:
+        ends = []
+    if len(ends) not in (1, 2):
+        raise InputError(f"{option} must be a number or LOW:HIGH; received {text!r}")
+    return ends[0], ends[-1]
+
+
+def _makeable(
+    path: Path | None, options: dict[str, object], recipes: bool, goal: Goal
+) -> Makeable:
+    from pydantic import ValidationError
+
+    from ..analysis import goals, makeable
+    from ..core.errors import InputError
+    from ..core.toml import read_toml
+
+    data: dict[str, object] = {}
+    if path is not None:
+        data = read_toml(path, makeable.Makeable).model_dump(exclude_unset=True)
+    data |= {key: value for key, value in options.items() if value is not None}
+    length_mm = goals.curve_length_mm(goal)
+    if length_mm is not None:
+        data["total_length_mm"] = (length_mm, length_mm)
+    if recipes:
+        data["recipe"] = [dict(recipe) for recipe in makeable.PAPER_RECIPES]
+        data["sides_mm"] = list(makeable.PAPER_SIDES_MM)
+    try:
+        return makeable.Makeable.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        message = first["msg"].removeprefix("Value error, ")
+        raise InputError(f"{key}: {message}" if key else message) from None
+
+
+def _write(found: list[Design], out: Path) -> None:
+    import json
+
+    from ..core.files import write_text
+    from ..core.specimen_file import specimen_dict
+
+    out.mkdir(parents=True, exist_ok=True)
+    for number, one in enumerate(found, start=1):
+        text = json.dumps(specimen_dict(one.specimen), indent=2) + "\n"
+        write_text(out / f"design_{number}.json", text)
+
+
+def _print(found: list[Design], goal: Goal) -> None:
+    unit = {"radius": "mm", "angle": "deg"}.get(goal.kind, "mm")
+    share = "%" if goal.kind in ("radius", "angle") else "mm"
+    typer.echo(f"{goal.words}:")
+    for number, one in enumerate(found, start=1):
+        rod = one.specimen
+        moduli = "-".join(f"{s.E_MPa:.4g}" for s in rod.sections)
+        lengths = "-".join(f"{s.length_mm:.4g}" for s in rod.sections)
+        typer.echo(
+            f"{number}. side {rod.side_mm:.4g} mm, {moduli} MPa, {lengths} mm, "
+            f"{rod.remanence_mT:g} mT: {one.achieved:.5g} {unit}, "
+            f"error {one.error:.2g} {share}, tolerance {one.tolerance:.2g} {unit}"
+        )
