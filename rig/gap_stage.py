@@ -17,6 +17,7 @@ from ..core.progress import Progress, silent
 from .clock import Clock
 from .stage import (
     InterlockError,
+    Moved,
     PositionLostError,
     PositionState,
     Stage,
@@ -131,15 +132,34 @@ class GapStage:
         self._from_far_side = False
         self._stage.home()
 
-    def assume_gap(self, gap_mm: float) -> None:
+    def assume_gap(self, gap_mm: float) -> float:
         """Take the operator's word that the stage stands at `gap_mm`.
 
-        For controllers without switches (``homing = "manual"``). The controller's own
-        count is kept; what changes is that it is believed.
+        The controller's count is kept; the map moves. Without switches (``homing =
+        "manual"``) the position counts as ``homed`` from here; with switches the stage
+        must have been homed before.
+
+        Returns
+        -------
+        float
+            The `gap_at_zero_mm` that belongs into the rig file.
+
+        Raises
+        ------
+        StageError
+            If the stage is not standing, or must be homed first.
         """
         finite(gap_mm, "gap_mm", "mm")
-        self._stage.assume_homed(self.to_machine_mm(gap_mm))
+        machine_mm = self._stage.status().machine_mm
+        if machine_mm is None:
+            raise PositionLostError("the stage does not report a position; home it")
+        self._stage.assume_homed(machine_mm)
+        gap_at_zero_mm = gap_mm - self._config.direction * machine_mm
+        self._config = self._config.model_copy(
+            update={"gap_at_zero_mm": gap_at_zero_mm}
+        )
         self._from_far_side = False
+        return gap_at_zero_mm
 
     def range_mm(self) -> tuple[float, float]:
         """Return the smallest and largest gap that may be asked for, in mm."""
@@ -185,6 +205,7 @@ class GapStage:
         *,
         feed_mm_min: float | None = None,
         progress: Progress = silent,
+        moved: Moved | None = None,
     ) -> MoveRecord:
         """Go to a gap, from the far side, and return when the stage stands there.
 
@@ -196,6 +217,8 @@ class GapStage:
             Speed in mm/min; by default that of the rig file.
         progress : callable
             Called with legs done and legs in all.
+        moved : callable, optional
+            Called with the gap in mm, some times a second, on the way.
 
         Raises
         ------
@@ -218,7 +241,7 @@ class GapStage:
         self._from_far_side = False
         for index, leg_mm in enumerate(legs):
             progress(index, len(legs))
-            self._stage.move_to(self.to_machine_mm(leg_mm), feed_mm_min=feed)
+            self._move(leg_mm, feed, moved)
         progress(len(legs), len(legs))
         self._from_far_side = approach == "far side"
         there = self.status()
@@ -249,6 +272,10 @@ class GapStage:
     def stop_requested(self) -> bool:
         """Return whether ``magbend rig stop`` asks this process to stop."""
         return self._stage.stop_requested()
+
+    def request_stop(self) -> None:
+        """Ask the thread that moves the stage to hold; safe from any thread."""
+        self._stage.request_stop()
 
     def hold(self) -> None:
         """Slow down, stand, forget the rest of the move; the position stays good."""
@@ -304,6 +331,17 @@ class GapStage:
     def close(self) -> None:
         """Let go of the port."""
         self._stage.close()
+
+    def _move(self, gap_mm: float, feed_mm_min: float, moved: Moved | None) -> None:
+        machine_mm = self.to_machine_mm(gap_mm)
+        if moved is None:
+            self._stage.move_to(machine_mm, feed_mm_min=feed_mm_min)
+            return
+        self._stage.move_to(
+            machine_mm,
+            feed_mm_min=feed_mm_min,
+            moved=lambda place_mm: moved(self.to_gap_mm(place_mm)),
+        )
 
     def _legs(self, here_mm: float, gap_mm: float) -> tuple[list[float], Approach]:
         """Gaps to visit in turn, so that the last motion is toward the magnet."""

@@ -34,6 +34,7 @@ from .stage import (
     AlarmError,
     InterlockError,
     LinkLostError,
+    Moved,
     PositionLostError,
     PositionState,
     StageIdentity,
@@ -41,6 +42,7 @@ from .stage import (
     StageStatus,
     StageTimeoutError,
     StoppedError,
+    unheard,
 )
 from .stage_config import StageConfig
 
@@ -183,30 +185,34 @@ class GrblStage:
         self._position = "homed"
 
     def assume_homed(self, machine_mm: float) -> None:
-        """Take the operator's word that the board's count is `machine_mm`.
+        """Take the operator's word that the board's count is right.
 
         Raises
         ------
         StageError
-            If the board counts otherwise: then `gap_at_zero_mm` is what to change.
+            If the stage is not idle, counts otherwise, or has switches and was not
+            homed by them.
         """
         session = self._require_session()
         report = self._wait_for_report(session)
         here = self._machine_mm()
         if report.state != "idle" or here is None:
-            raise StageError(
-                f"the stage must be idle for this; it is in {report.state}"
-            )
+            raise StageError(f"the stage must be idle; it is in {report.state}")
         if abs(here - machine_mm) > self.limits.step_mm:
             raise StageError(
-                f"the board counts {here:.3f} mm where the rig file expects "
-                f"{machine_mm:.3f} mm: change stage.gap_at_zero_mm by "
-                f"{self._config.direction * (machine_mm - here):+.3f} mm"
+                f"the board counts {here:.3f} mm, not {machine_mm:.3f} mm: it moved"
+            )
+        if self._config.homing == "switches" and self._position != "homed":
+            raise PositionLostError(
+                f"the position of the stage is {self._position}; it has switches: "
+                "home it first (magbend rig home)"
             )
         self._standing_at = session.machine()
         self._position = "homed"
 
-    def move_to(self, machine_mm: float, *, feed_mm_min: float) -> None:
+    def move_to(
+        self, machine_mm: float, *, feed_mm_min: float, moved: Moved = unheard
+    ) -> None:
         """Go there in pieces and return when the stage stands there.
 
         Raises
@@ -232,7 +238,7 @@ class GrblStage:
         with self._stop_if_interrupted():
             for piece in range(1, pieces + 1):
                 target = here + distance * piece / pieces
-                self._move_piece(session, target, feed_mm_min)
+                self._move_piece(session, target, feed_mm_min, moved)
 
     def status(self) -> StageStatus:
         """Ask the board; no answer is the state ``silent``."""
@@ -260,6 +266,11 @@ class GrblStage:
     def stop_requested(self) -> bool:
         """Return whether another process asks this one to stop the stage."""
         return self._presence is not None and self._presence.stop_asked()
+
+    def request_stop(self) -> None:
+        """Ask the thread that moves the stage to hold; safe from any thread."""
+        if self._presence is not None:
+            self._presence.ask_to_stop()
 
     def hold(self) -> None:
         """Feed hold, wait for standstill, forget the rest; the position stays good.
@@ -354,7 +365,11 @@ class GrblStage:
         self._disconnect()
 
     def _move_piece(
-        self, session: GrblSession, target_mm: float, feed_mm_min: float
+        self,
+        session: GrblSession,
+        target_mm: float,
+        feed_mm_min: float,
+        moved: Moved,
     ) -> None:
         start = self._machine_mm()
         distance = abs(target_mm - start) if start is not None else 0.0
@@ -376,6 +391,7 @@ class GrblStage:
                 target,
                 restarts=restarts,
                 check_stop=self._raise_if_stop_asked,
+                moved=moved,
             )
         except CommandRefusedError as error:
             if error.code == "15":

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from .clock import Clock
 from .grbl_protocol import Alarm, Ok, Refusal, Report
 from .grbl_session import CommandRefusedError, GrblSession
-from .stage import StageTimeoutError
+from .stage import Moved, StageTimeoutError
 
 POLL_S = 0.1
 _STALL_S = 1.5
@@ -44,6 +44,7 @@ def await_arrival(
     *,
     restarts: int,
     check_stop: Callable[[], None],
+    moved: Moved,
 ) -> None:
     """Return when the stage stands at the target.
 
@@ -53,6 +54,8 @@ def await_arrival(
         `GrblSession.restarts` before the motion was sent.
     check_stop : callable
         Called before every question; raises to stop waiting.
+    moved : callable
+        Called with the machine position in mm after every answer.
 
     Raises
     ------
@@ -75,6 +78,7 @@ def await_arrival(
         machine = session.machine()
         if report and machine and len(machine) > target.axis:
             heard_s, here = now_s, machine[target.axis]
+            moved(here)
             at_target = abs(here - target.machine_mm) <= target.tolerance_mm
             if report.state == "idle" and at_target:
                 return

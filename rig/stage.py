@@ -5,7 +5,7 @@ What people use is the gap in front of the magnet; `gap_stage` maps it onto this
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
@@ -144,6 +144,14 @@ class StageIdentity:
     settings: Mapping[str, str] = field(default_factory=dict)
 
 
+Moved = Callable[[float], None]
+"""Called with the machine position in mm, some times a second, on the way."""
+
+
+def unheard(_machine_mm: float) -> None:
+    """Tell nobody where the stage is."""
+
+
 class Stage(Protocol):
     """One motorised axis in its own machine frame (mm).
 
@@ -178,7 +186,9 @@ class Stage(Protocol):
         """Take the operator's word that the controller's position is right."""
         ...
 
-    def move_to(self, machine_mm: float, *, feed_mm_min: float) -> None:
+    def move_to(
+        self, machine_mm: float, *, feed_mm_min: float, moved: Moved = unheard
+    ) -> None:
         """Go to a machine position and return when the stage stands there."""
         ...
 
@@ -188,6 +198,10 @@ class Stage(Protocol):
 
     def stop_requested(self) -> bool:
         """Return whether another process asks this one to stop the stage."""
+        ...
+
+    def request_stop(self) -> None:
+        """Ask the thread that moves the stage to hold; safe from any thread."""
         ...
 
     def hold(self) -> None:

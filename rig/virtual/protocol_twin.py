@@ -7,7 +7,6 @@ settings and position between programs, as a powered board would.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,10 +14,10 @@ from urllib.parse import parse_qs, urlsplit
 
 from serial import PortNotOpenError, SerialBase, SerialException
 
-from ...core.files import write_text
+from ...core.errors import StageError
 from ..clock import Clock, ScaledClock, SystemClock
+from .board_file import load_board, save_board
 from .grbl_board import GrblBoard
-from .plant import Plant
 
 _SLICE_S = 0.005
 _BOARDS: dict[str, tuple[GrblBoard, Clock]] = {}
@@ -138,22 +137,15 @@ class Serial(SerialBase):
     def _own_board(self, name: str, query: dict[str, list[str]]) -> GrblBoard:
         speed = float(query.get("speed", ["1"])[0])
         self._clock = SystemClock() if speed == 1.0 else ScaledClock(speed)
-        if not name:
-            return _homing_board(Plant())
-        self._state_file = Path(name)
-        return _load(self._state_file)
+        self._state_file = Path(name) if name else None
+        try:
+            return load_board(self._state_file)
+        except StageError as error:
+            raise SerialException(str(error)) from None
 
     def _save(self) -> None:
-        if self._state_file is None or self._board is None:
-            return
-        board = self._board
-        state = {
-            "settings": {str(k): v for k, v in board.eeprom.values.items()},
-            "carriage_mm": board.plant.carriage_mm,
-            "position": board.position,
-            "locked": board.state == "Alarm",
-        }
-        write_text(self._state_file, json.dumps(state, indent=1) + "\n")
+        if self._state_file is not None and self._board is not None:
+            save_board(self._board, self._state_file)
 
     def _reconfigure_port(self, *_: Any, **__: Any) -> None:
         """Baud and parity mean nothing to a virtual port."""
@@ -161,24 +153,3 @@ class Serial(SerialBase):
     _update_rts_state: Callable[[Any], None] = _reconfigure_port
     _update_dtr_state: Callable[[Any], None] = _reconfigure_port
     _update_break_state: Callable[[Any], None] = _reconfigure_port
-
-
-def _homing_board(plant: Plant) -> GrblBoard:
-    """Return a board set up as the rig wants it: homing and limits on."""
-    return GrblBoard(plant, {20: 1, 21: 1, 22: 1, 10: 3, 1: 255, 130: 180})
-
-
-def _load(path: Path) -> GrblBoard:
-    try:
-        state = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return _homing_board(Plant())
-    except (OSError, ValueError) as error:
-        raise SerialException(f"could not open port {path}: {error}") from None
-    x, y, z = state["carriage_mm"]
-    settings = {int(k): v for k, v in state["settings"].items()}
-    board = GrblBoard(Plant(start_mm=(x, y, z)), settings)
-    board.advance(0.1)
-    board.position = [int(steps) for steps in state["position"]]
-    board.assume_position(locked=bool(state["locked"]))
-    return board

@@ -1,0 +1,298 @@
+"""``magbend rig``: the commands that speak with the stage alone."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .console import print_json
+
+if TYPE_CHECKING:
+    from ..rig.gap_stage import GapStage
+    from ..rig.stage_config import StageConfig
+
+RigOption = Annotated[Path, typer.Option("--rig", help="The rig file.")]
+PortOption = Annotated[
+    str | None, typer.Option("--port", help="Instead of stage.port of the rig file.")
+]
+LogOption = Annotated[
+    Path | None, typer.Option("--log", help="Append every byte to this file.")
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="For a machine.")]
+RIG = Path("rig.toml")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands of this module to the group ``rig``."""
+    for name, command, example in (
+        ("ports", ports, "ports"),
+        ("status", status, "status --rig rig.toml"),
+        ("home", home, "home --rig rig.toml"),
+        ("goto", goto, "goto 60 --rig rig.toml"),
+        ("jog", jog, "jog --rig rig.toml"),
+        ("stop", stop, "stop --rig rig.toml"),
+        ("unlock", unlock, "unlock --rig rig.toml"),
+        ("set-gap", set_gap, "set-gap 70.2 --rig rig.toml"),
+        ("twin", twin, "twin --state board.json"),
+    ):
+        app.command(name, epilog=f"Example: magbend rig {example}")(command)
+
+
+def ports(as_json: JsonOption = False) -> None:
+    """List the serial ports of this machine."""
+    import dataclasses
+
+    from ..rig.ports import list_ports
+
+    found = list_ports()
+    if as_json:
+        print_json([dataclasses.asdict(port) for port in found])
+        return
+    if not found:
+        typer.echo("no serial ports; is the cable in, and does it carry data?")
+    for port in found:
+        serial = f"serial:{port.serial_number}" if port.serial_number else "-"
+        typer.echo(f"{port.device:<20} {port.usb_id or '-':<10} {serial:<24} "
+                   f"{port.description}")  # fmt: skip
+
+
+def status(
+    rig: RigOption = RIG,
+    port: PortOption = None,
+    as_json: JsonOption = False,
+    watch: Annotated[
+        bool, typer.Option("--watch", help="Ask twice a second until Ctrl-C.")
+    ] = False,
+    log: LogOption = None,
+) -> None:
+    """Say where the stage is, what it does, and how far it may go."""
+    import time
+
+    with _connected(rig, port, log) as stage:
+        if not watch:
+            data = _facts(stage)
+            print_json(data) if as_json else typer.echo(_screen(data))
+            return
+        with contextlib.suppress(KeyboardInterrupt):
+            while True:
+                data = _facts(stage)
+                if as_json:
+                    print_json(data)
+                else:
+                    typer.echo(_line(data))
+                time.sleep(0.5)
+
+
+def home(rig: RigOption = RIG, port: PortOption = None, log: LogOption = None) -> None:
+    """Find the reference of the stage by its switches (a stock build homes Z, X, Y)."""
+    with _connected(rig, port, log) as stage:
+        typer.echo("homing; Ctrl-C stops it at once", err=True)
+        with _told_how_to_go_on("home it again"):
+            stage.home()
+        typer.echo(_line(_facts(stage)))
+
+
+def goto(
+    gap_mm: Annotated[float, typer.Argument(help="Gap in mm from the N face.")],
+    rig: RigOption = RIG,
+    port: PortOption = None,
+    home_first: Annotated[
+        bool, typer.Option("--home", help="Home first if the position is not known.")
+    ] = False,
+    feed_mm_min: Annotated[
+        float | None, typer.Option(help="Speed instead of stage.feed_mm_min.")
+    ] = None,
+    as_json: JsonOption = False,
+    log: LogOption = None,
+) -> None:
+    """Go to a gap, from the far side; Ctrl-C slows down and keeps the position."""
+    import dataclasses
+
+    with _connected(rig, port, log) as stage:
+        stage.check_gap(gap_mm)
+        if home_first and stage.position_state != "homed":
+            typer.echo("homing; Ctrl-C stops it at once", err=True)
+            stage.home()
+        with _told_how_to_go_on("the position was kept"):
+            record = stage.goto_gap(gap_mm, feed_mm_min=feed_mm_min, moved=_ticker())
+        if as_json:
+            print_json(dataclasses.asdict(record))
+        else:
+            typer.echo(
+                f"gap {record.gap_mm:.3f} mm (machine {record.stage_mm:.3f} mm), "
+                f"{record.duration_s:.1f} s, approached from the {record.approach}"
+            )
+
+
+def jog(rig: RigOption = RIG, port: PortOption = None, log: LogOption = None) -> None:
+    """Move by keys, with the position on the screen: arrows, 1 to 5, h, space, q."""
+    from .jog_keys import jog_loop
+
+    with _connected(rig, port, log) as stage:
+        jog_loop(stage)
+
+
+def stop(rig: RigOption = RIG, port: PortOption = None) -> None:
+    """Stop the stage, also while another command or run holds its port."""
+    from ..rig.clock import SystemClock
+    from ..rig.stop_request import stop_from_outside
+
+    config, _ = _tables(rig, port)
+    typer.echo(stop_from_outside(config, SystemClock()))
+
+
+def unlock(
+    rig: RigOption = RIG,
+    port: PortOption = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask.")] = False,
+    log: LogOption = None,
+) -> None:
+    """Lift an alarm without homing ($X): the stage may not know where it is."""
+    with _connected(rig, port, log) as stage:
+        before = stage.status()
+        if before.state != "alarm":
+            typer.echo(f"the stage is not locked; it is {before.state}")
+            return
+        sure = yes or typer.confirm(
+            "The stage may not know where it is. Homing is safer. Unlock all the same?"
+        )
+        if not sure:
+            typer.echo("still locked")
+            return
+        stage.unlock(confirm=True)
+        typer.echo(_line(_facts(stage)))
+
+
+def set_gap(
+    gap_mm: Annotated[float, typer.Argument(help="The measured gap, in mm.")],
+    rig: RigOption = RIG,
+    port: PortOption = None,
+    log: LogOption = None,
+) -> None:
+    """Tell which gap the stage stands at now; written to gap_at_zero_mm."""
+    from ..rig.rig_file_edit import replace_gap_at_zero
+
+    with _connected(rig, port, log) as stage:
+        gap_at_zero_mm = stage.assume_gap(gap_mm)
+        replace_gap_at_zero(rig, gap_at_zero_mm)
+        typer.echo(f"{rig}: gap_at_zero_mm = {gap_at_zero_mm:.3f}")
+
+
+def twin(
+    state: Annotated[
+        Path | None, typer.Option("--state", help="Keep settings and position here.")
+    ] = None,
+) -> None:
+    """Offer a virtual GRBL board on a pseudo-terminal until Ctrl-C (Linux, macOS)."""
+    import time
+
+    from ..rig.clock import SystemClock
+    from ..rig.virtual.board_file import load_board, save_board
+    from ..rig.virtual.pty_server import PtyBoard
+
+    board = load_board(state)
+    with PtyBoard(board, SystemClock()) as served:
+        typer.echo(served.port)
+        with contextlib.suppress(KeyboardInterrupt):
+            while True:
+                time.sleep(3600.0)
+    if state is not None:
+        save_board(board, state)
+
+
+def _tables(rig: Path, port: str | None) -> tuple[StageConfig, Any]:
+    from ..rig.config import read_rig
+
+    model = read_rig(rig)
+    config = model.stage
+    if port:
+        config = config.model_copy(update={"port": port})
+    return config, model.limits
+
+
+@contextlib.contextmanager
+def _connected(rig: Path, port: str | None, log: Path | None) -> Iterator[GapStage]:
+    from ..rig.clock import SystemClock
+    from ..rig.gap_stage import GapStage
+    from ..rig.link import WireLog
+    from ..rig.stages import make_stage
+
+    config, bounds = _tables(rig, port)
+    clock = SystemClock()
+    wire = WireLog(log, clock) if log else None
+    stage = GapStage(make_stage(config, clock, log=wire), config, bounds, clock)
+    try:
+        stage.connect()
+        yield stage
+    finally:
+        stage.close()
+        if wire:
+            wire.close()
+
+
+@contextlib.contextmanager
+def _told_how_to_go_on(what: str) -> Iterator[None]:
+    from ..core.errors import RigError
+
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise RigError(f"stopped by Ctrl-C; {what}") from None
+
+
+def _facts(stage: GapStage) -> dict[str, Any]:
+    import dataclasses
+
+    low, high = stage.range_mm()
+    identity = stage.identity
+    return {
+        **dataclasses.asdict(stage.status()),
+        "allowed_mm": [low, high],
+        "port": identity.port,
+        "firmware": identity.firmware,
+    }
+
+
+def _screen(data: dict[str, Any]) -> str:
+    gap = data["gap_mm"]
+    machine = data["stage_mm"]
+    low, high = data["allowed_mm"]
+    where = "unknown" if gap is None else f"{gap:.3f} mm"
+    counted = "-" if machine is None else f"{machine:.3f} mm"
+    alarm = f" ALARM:{data['alarm']}" if data["alarm"] else ""
+    rows = {
+        "port": f"{data['port']}  {data['firmware']}",
+        "state": f"{data['state']}{alarm}",
+        "position": data["position_state"],
+        "gap": f"{where}  (machine {counted})",
+        "allowed": f"{low:g} to {high:g} mm",
+        "switches": data["pins"] or "none closed",
+    }
+    if data["state"] == "alarm":
+        rows["to do"] = "home it (magbend rig home), or magbend rig unlock"
+    elif data["position_state"] != "homed":
+        rows["to do"] = "home it: magbend rig home"
+    return "\n".join(f"{name:<10}{text}" for name, text in rows.items())
+
+
+def _line(data: dict[str, Any]) -> str:
+    gap = data["gap_mm"]
+    where = "gap unknown" if gap is None else f"gap {gap:.3f} mm"
+    return f"{where}  {data['state']}  {data['position_state']}"
+
+
+def _ticker() -> Any:
+    """Return a callback that shows the gap on the way, where there is a terminal."""
+    import sys
+
+    if not sys.stderr.isatty():
+        return None
+
+    def show(gap_mm: float) -> None:
+        typer.echo(f"\rgap {gap_mm:8.3f} mm ", nl=False, err=True)
+
+    return show
