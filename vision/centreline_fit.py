@@ -2,8 +2,8 @@
 
 The curve is p(s) = p0 + integral of (cos theta, sin theta), so its parameter is arc
 length without any later correction. Measured points pull along the normal only. Knots
-are dense (about one a rod width); what keeps the fit smooth is a penalty on theta''
-whose weight is the most likely one (restricted maximum likelihood, Wood 2011). Joints
+are dense (about one a rod width); what keeps the fit smooth is a penalty on theta'''
+(so that a curvature which changes evenly, as at the root, is left alone), whose weight is the most likely one (restricted maximum likelihood, Wood 2011). Joints
 of known place get triple knots: theta stays continuous there and the curvature may
 jump. The covariance is the Bayesian one of Wahba (1983), which covers the bias of
 smoothing on average, widened by the correlation seen in the residuals.
@@ -162,7 +162,7 @@ def fit_curve(
     theta : ndarray, shape (n,), optional
         Tangent angles to start from; otherwise from the points.
     stiffness : float, optional
-        Weight of the penalty, px^3; the most likely one when not given.
+        Weight of the penalty, px^5; the most likely one when not given.
 
     Returns
     -------
@@ -175,7 +175,7 @@ def fit_curve(
     penalty = _penalty(knots)
     if theta is None:
         theta = _chord_angles(points)
-    start = basis.T @ basis + 1e-3 * penalty * spacing**3
+    start = basis.T @ basis + 1e-3 * penalty * spacing**5
     start += 1e-9 * np.eye(basis.shape[1])
     coefficients = np.linalg.solve(start, basis.T @ theta)
     weight = weights / max(float(weights.max()), 1e-12)
@@ -266,22 +266,16 @@ def _fill_basis(knots: Array, s: Array, basis: Array, slopes: Array) -> None:
 
 
 def _penalty(knots: Array) -> Array:
-    """Integral of theta''^2, exact: theta' is a parabola between knots."""
+    """Integral of theta'''^2, exact: theta' is a parabola between knots."""
     low, high = knots[_DEGREE:-_DEGREE - 1], knots[_DEGREE + 1:-_DEGREE]  # fmt: skip
     real = high > low
-    low, high = low[real], high[real]
-    # theta'' is linear: its square by Simpson from both ends and the middle; each from
-    # theta' at points well inside, where no knot is in doubt.
-    length = high - low
+    low, length = low[real], (high - low)[real]
+    # Second differences of theta' at points well inside, where no knot is in doubt.
     inner = low[:, None] + length[:, None] * np.array([0.1, 0.5, 0.9])
     _, slopes = _design(knots, inner.ravel())
     first, middle, last = slopes.reshape(len(low), 3, -1).transpose(1, 0, 2)
-    step = 0.4 * length[:, None]
-    bend = (first - 2.0 * middle + last) / step**2
-    centre = (last - first) / (2.0 * step)
-    half = 0.5 * length[:, None]
-    total: Array = (centre * length[:, None]).T @ centre
-    return total + (bend * 2.0 * half**3 / 3.0).T @ bend
+    bend = (first - 2.0 * middle + last) / (0.4 * length[:, None]) ** 2
+    return np.asarray((bend * length[:, None]).T @ bend)
 
 
 def _chord_angles(points: Array) -> Array:
@@ -376,7 +370,7 @@ def _solve(
         stored = float(coefficients @ pull[1:])
         count = float(np.count_nonzero(weight)) / _SHARED
         strength = _most_likely(
-            scale, d, force, bend, total, stored, max(count - 3.0, 1.0)
+            scale, d, force, bend, total, stored, max(count - 4.0, 1.0)
         )
     growth = 1.0 + strength * d
     root = z / np.sqrt(growth)
@@ -395,12 +389,12 @@ def _most_likely(
     count: float,
 ) -> float:  # fmt: skip
     """Return the penalty weight of greatest restricted likelihood."""
-    weights = scale * 10.0 ** np.arange(-8.5, 4.0, 0.25)
+    weights = scale * 10.0 ** np.arange(-9.0, 5.0, 0.25)
     growth = 1.0 + weights[:, None] * d
     gain = np.sum((force - weights[:, None] * bend) ** 2 / growth, axis=1)
     left = np.maximum(total + weights * stored - gain, 1e-12 * total + 1e-30)
     score = count * np.log(left) + np.sum(np.log(growth), axis=1)
-    score -= (len(d) - 3.0) * np.log(weights)
+    score -= (len(d) - 4.0) * np.log(weights)
     return float(weights[int(np.argmin(score))])
 
 

@@ -91,7 +91,7 @@ def _face(
     place = _steepest(mean, -s[::-1], -expected, reach, 0.12 * contrast)
     if place is None:
         return None
-    crossing = crossings_of(light, -s[::-1], place, near, 5.0, 3.0, reach=4.0)
+    crossing = crossings_of(light, -s[::-1], place, near, 3.0, 4.0, reach=4.0)
     line = line_through(across, crossing)
     return None if line is None else _turned(line)
 
@@ -108,7 +108,7 @@ def _front(
         place = _steepest(mean, s, expected, reach, 0.15 * contrast)
         if place is None:
             continue
-        crossings.extend(crossings_of(light, s, place, near, 5.0, 3.0, reach=4.0))
+        crossings.extend(crossings_of(light, s, place, near, 3.0, 4.0, reach=4.0))
         offsets.extend(across)
     if len(offsets) < _LANES:
         return None

@@ -20,6 +20,9 @@ Image = NDArray[np.float32]
 
 _PASSES = 4
 
+ROOT_CLEAR = 0.5
+"""Widths next to the clamp that are left out of the fit."""
+
 
 class LostError(Exception):
     """The edges or an end of the rod got lost; private to this package.
@@ -142,7 +145,9 @@ def _pass(
     blur = edges.blur
     state.blur = float(np.clip(blur, 0.3, 0.5 * state.width)) if blur > 0 else 1.0
     tip, lines, first = _ends(grey, state, edges, good, root, sign, turn)
-    fit, used = _fit(state, edges, good, first, tip.s, joints, turn)
+    fit, used = _fit(
+        state, edges, good, first, tip.s, joints, turn, clamped=root == "clamp"
+    )
     shift = replace(tip, s=tip.s - first)
     at = fit.curve.s + first
     smooth, sigma = _smooth_width(curve.s, edges, good, at, state.width)
@@ -231,7 +236,7 @@ def _border_crossing(grey: Image, curve: Curve) -> float:
 
 def _fit(
     state: _State, edges: Edges, good: NDArray[np.bool_], first: float, last: float,
-    joints: Callable[[Curve], Sequence[float]], turn: int,
+    joints: Callable[[Curve], Sequence[float]], turn: int, *, clamped: bool,
 ) -> tuple[CurveFit, NDArray[np.bool_]]:  # fmt: skip
     curve, width = state.curve, state.width
     if last - first < 4.0 * width:
@@ -242,7 +247,9 @@ def _fit(
     offset = np.interp(s, curve.s[good], edges.middle[good])
     share = np.interp(s, curve.s, good.astype(np.float64), left=0.0, right=0.0)
     clear = max(2.0, 2.5 * state.blur)
-    used = (share > 0.99) & (s > first + clear) & (s < last - clear)
+    # The corner between clamp and paper is dark: edges there are no edges of the rod.
+    root = max(clear, ROOT_CLEAR * width) if clamped else clear
+    used = (share > 0.99) & (s > first + root) & (s < last - clear)
     if used.sum() < 8:
         raise LostError("edges_lost", "too few edges of the rod are seen")
     measured = points + offset[:, None] * np.column_stack(

@@ -215,9 +215,14 @@ def _root(refined: Refined, local: _Local, setting: Setting, side_mm: float) -> 
         seen = 0.0 if line is None else line.s
         top = setting.clamp_height_mm
         return seen if top is None else seen - rise * (top - setting.rod_height_mm)
+    seen_at = []
     if face is not None:
-        return face.s - 0.5 * rise * side_mm
-    return 0.0 if front is None else front.s + rise * setting.rod_height_mm
+        seen_at.append(face.s - 0.5 * rise * side_mm)
+    if front is not None:
+        seen_at.append(front.s + rise * setting.rod_height_mm)
+    if len(seen_at) == 2 and abs(seen_at[1] - seen_at[0]) > 2.0:
+        return seen_at[0]
+    return float(np.mean(seen_at)) if seen_at else 0.0
 
 
 def _local(camera: Calibration, curve: Curve, index: int, height: float) -> _Local:

@@ -187,8 +187,8 @@ def crossings_of(
     place, reach : float
         Where to look, and how far to either side.
     near, inner, outer : float
-        Levels are means over `inner` before and `outer` behind, `near` px clear of
-        `place`.
+        The level before is a mean over `inner`, the level behind a line through
+        `outer` carried to `place`, both `near` px clear of it.
 
     Returns
     -------
@@ -211,7 +211,7 @@ def _cross_lanes(
     count, columns = light.shape
     for i in range(count):
         low = _mean(light, i, place - near - inner, place - near)
-        high = _mean(light, i, place + near, place + near + outer)
+        high = _line(light, i, place + near, place + near + outer, place)
         if not high > low:
             continue
         level = 0.5 * (low + high)
@@ -231,6 +231,23 @@ def _cross_lanes(
             if abs(line - best - 0.5) <= 1.0:
                 at = line
         out[i] = at
+
+
+@njit(cache=True)
+def _line(light: Array, i: int, first: float, last: float, at: float) -> float:
+    """Value at a place of the straight line through samples beside it."""
+    n, st, sg, stt, stg = 0, 0.0, 0.0, 0.0, 0.0
+    for k in range(max(int(np.ceil(first)), 0), min(int(last), light.shape[1] - 1) + 1):
+        if np.isfinite(light[i, k]):
+            t, g = k - at, light[i, k]
+            n += 1
+            st += t
+            sg += g
+            stt += t * t
+            stg += t * g
+    if n < 4:
+        return np.nan
+    return (stt * sg - st * stg) / (n * stt - st * st)
 
 
 @njit(cache=True)

@@ -83,7 +83,7 @@ def smooth_curve(points: Array, *, spacing: float) -> Curve:
     s, even, theta = _resample(points, 0.25 * spacing)
     fit = fit_curve(
         s, even, np.ones(len(s)), spacing=spacing, iterations=2, theta=theta,
-        stiffness=spacing**3,
+        stiffness=0.1 * spacing**5,
     )  # fmt: skip
     return fit.curve
 
