@@ -81,7 +81,8 @@ def solve(
     if not (support.in_plane and (isinstance(field, UniformField) or field.in_plane)):
         from .spatial import solve_spatial
 
-        return solve_spatial(specimen, field, support=support, points=points)
+        spatial = solve_spatial(specimen, field, support=support, points=points)
+        return spatial.seen_from_above()
     rod = rod_array(specimen, support)
     length_mm = specimen.length_mm
     margin = 0.5 * max(specimen.sides_mm) / length_mm

@@ -1,0 +1,270 @@
+"""The rod in space: weight in any direction, magnets off the plane, tilted moments.
+
+Kirchhoff rod with straight or curved rest shape, sections of rectangular or round
+profile (EI about both axes, GJ by Saint-Venant's series), marched from the free tip.
+The magnetisation along the axis acts as a pole load, exactly; its transverse part as
+distributed torque and force with the field's closed-form gradient.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.centreline import Centreline
+from ..core.checks import within
+from ..core.errors import InputError, SolverError
+from ..core.specimen import Specimen
+from ..core.units import mT_from_T, rad_from_deg
+from .fields import (
+    FLUX_LIMIT_T,
+    PULLED_IN,
+    STABLE,
+    UNSTABLE,
+    Field,
+    MagnetField,
+    Solution,
+    Support,
+    UniformField,
+)
+from .magnet_field import BLOCK_SIZE, inside
+from .scaling import field_array, stations
+from .spatial_march import AXIAL, C1, C3, K1, K3, MU1, WX, WZ, H, flux_at
+from .spatial_rod import SpatialRod, SpatialSection, Vector, rod_table
+from .spatial_solve import shape, solve_pose
+
+__all__ = ["SpatialRod", "SpatialSection", "SpatialSolution", "solve_spatial"]
+
+Array = NDArray[np.float64]
+
+REACH_LIMIT = 30.0
+"""Largest sum of h sqrt(P / EI): beyond, a tip's pose no longer fixes the root's."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SpatialSolution:
+    """The equilibrium in space that the rod reaches when its load grows from zero.
+
+    Parameters
+    ----------
+    s_mm : ndarray, shape (n,)
+        Arc length; empty where there is no equilibrium, as the arrays below.
+    r_mm : ndarray, shape (n, 3)
+        Positions in the specimen frame.
+    directors : ndarray, shape (n, 3, 3)
+        Rows d1, d2 and d3 (the tangent) in the specimen frame.
+    curvature_per_mm : ndarray, shape (n, 3)
+        Curvature about d1, d2 and twist about d3.
+    status, morse_index, error_mm, load_limit
+        As of `Solution`; the index counts unstable directions in space.
+    flux_tip_mT : tuple of float
+        Flux density (x, y, z) at the tip.
+    root_moment_Nm : tuple of float
+        Moment (x, y, z) at the clamp.
+    """
+
+    s_mm: Array
+    r_mm: Array
+    directors: Array
+    curvature_per_mm: Array
+    status: str
+    morse_index: int
+    error_mm: float
+    flux_tip_mT: Vector
+    root_moment_Nm: Vector
+    load_limit: float = 1.0
+
+    @property
+    def tangent(self) -> Array:
+        """Unit tangents, shape (n, 3)."""
+        return self.directors[:, 2]
+
+    def seen_from_above(self) -> Solution:
+        """Return what the top camera sees: x, y, and the angle of the view's curve.
+
+        `s_mm` stays the arc length of the rod in space, longer than that of its view;
+        `kappa_per_mm` is the derivative of the view's angle by it.
+        """
+        centreline = None
+        if len(self.s_mm):
+            t = self.tangent
+            slope = np.cross(self._turn(), t)
+            flat = t[:, 0] ** 2 + t[:, 1] ** 2
+            if np.any(flat < 1e-12):
+                raise SolverError(
+                    "the rod points at the camera somewhere: its view from above has "
+                    "no angle there; use the shape in space (solve_spatial)"
+                )
+            centreline = Centreline(
+                s_mm=self.s_mm,
+                x_mm=self.r_mm[:, 0],
+                y_mm=self.r_mm[:, 1],
+                theta_rad=np.unwrap(np.arctan2(t[:, 1], t[:, 0])),
+                kappa_per_mm=(t[:, 0] * slope[:, 1] - t[:, 1] * slope[:, 0]) / flat,
+            )
+        return Solution(
+            centreline=centreline, status=self.status, morse_index=self.morse_index,
+            error_mm=self.error_mm, flux_tip_mT=self.flux_tip_mT[:2],
+            root_moment_Nm=self.root_moment_Nm[2], load_limit=self.load_limit,
+        )  # fmt: skip
+
+    def _turn(self) -> Array:
+        """Darboux vector in the specimen frame, shape (n, 3)."""
+        return np.einsum("nk,nki->ni", self.curvature_per_mm, self.directors)
+
+    def to_csv(self) -> str:
+        """Return the shape as CSV: s, x, y, z, tangent, curvatures; 15 digits."""
+        names = "s_mm,x_mm,y_mm,z_mm,tx,ty,tz,kappa1_per_mm,kappa2_per_mm,twist_per_mm"
+        table = np.column_stack(
+            [self.s_mm, self.r_mm, self.tangent, self.curvature_per_mm]
+        )
+        rows = (",".join(f"{value:.15g}" for value in row) for row in table)
+        return "\n".join([names, *rows]) + "\n"
+
+
+def solve_spatial(
+    rod: SpatialRod | Specimen,
+    field: Field | Sequence[float],
+    *,
+    support: Support | None = None,
+    points: int = 61,
+) -> SpatialSolution:
+    """Return the equilibrium in space.
+
+    Parameters
+    ----------
+    rod : SpatialRod or Specimen
+        The rod.
+    field : UniformField, MagnetField or three floats
+        Three floats are a uniform flux density (x, y, z) in mT.
+    support : Support, optional
+        Clamp angle, weight (any direction), load factor.
+    points : int
+        Number of points of the shape, equally spaced from clamp to tip.
+
+    Raises
+    ------
+    InputError
+        If a value cannot be, the load is out of range, the weight lacks a density, or
+        the undeformed rod would touch the magnet.
+
+    Examples
+    --------
+    >>> from magbend.sim import UniformField, gmc
+    >>> tip = solve_spatial(gmc(2), UniformField(flux_mT=50.0)).r_mm[-1]
+    >>> [round(float(value), 5) for value in tip]
+    [29.53532, 4.70952, 0.0]
+    """
+    support = support or Support()
+    if isinstance(rod, Specimen):
+        rod = SpatialRod.from_specimen(rod)
+    L = rod.length_mm
+    flux = _flux_array(field, L)
+    table = rod_table(rod, support)
+    angle = rad_from_deg(support.clamp_angle_deg)
+    cos, sin = math.cos(angle), math.sin(angle)
+    clamp = np.array([[-sin, 0.0, cos], [cos, 0.0, sin], [0.0, 1.0, 0.0]])
+    s = stations(points)
+    if _touches(flux, np.outer(s, clamp[:, 2]), _margin(rod)):
+        raise InputError(
+            "gap_mm must leave the undeformed rod clear of the magnet, with half its "
+            f"side to spare; instead received {getattr(field, 'gap_mm', math.nan):g} mm"
+        )
+    n = _steps(table, flux, clamp[:, 2])
+    R, r = clamp.copy(), clamp[:, 2].copy()
+    index, load, error = solve_pose(table, flux, n, clamp, R, r)
+    if index < 0:
+        return _gone(flux, L, load, clamp[:, 2])
+    states = np.empty((points, 18))
+    shape(table, flux, 2 * n, R, r, s, states)
+    if _touches(flux, states[:, 12:15], _margin(rod)):
+        return _gone(flux, L, load, states[-1, 12:15])
+    return _solution(rod, table, flux, s, states, index, error)
+
+
+def _flux_array(field: Field | Sequence[float], length_mm: float) -> Array:
+    if isinstance(field, (UniformField, MagnetField)):
+        return field_array(field, length_mm)
+    if len(field) != 3:
+        raise InputError(
+            "field must be a UniformField, a MagnetField or three floats (x, y, z) in "
+            f"mT; instead received {len(field)} values"
+        )
+    limit_mT = FLUX_LIMIT_T * 1e3
+    out = np.zeros(1 + BLOCK_SIZE)
+    out[1:4] = [within(b, -limit_mT, limit_mT, "flux_mT", "mT") * 1e-3 for b in field]
+    return out
+
+
+def _steps(table: Array, flux: Array, tip: Array) -> float:
+    """Return steps per length of the rod; refuse loads beyond the march's reach."""
+    b = np.zeros(12)
+    flux_at(flux, tip[0], tip[1], tip[2], b)
+    size = float(np.linalg.norm(b[:3]))
+    load = np.abs(table[:, AXIAL : MU1 + 2]).sum(axis=1).max() * size
+    load += float(np.linalg.norm(table[:, WX : WZ + 1], axis=1) @ table[:, H])
+    soft = table[:, C1 : C3 + 1].max(axis=1)
+    reach = float(table[:, H] @ np.sqrt(soft * load))
+    if reach > REACH_LIMIT:
+        raise InputError(
+            f"the load on the rod must be below {REACH_LIMIT**2:g} times its stiffness "
+            f"EI / L^2; instead received {reach**2:.3g} times: check the units of "
+            "E_MPa, remanence_mT and flux"
+        )
+    turns = float(np.linalg.norm(table[:, K1 : K3 + 1], axis=1) @ table[:, H])
+    return 8.0 + 10.0 * reach + 4.0 * turns
+
+
+def _margin(rod: SpatialRod) -> float:
+    sides = [min(part.width_mm, part.height_mm) for part in rod.sections]
+    return 0.5 * max(sides) / rod.length_mm
+
+
+def _touches(flux: Array, points: Array, margin: float) -> bool:
+    return flux[0] != 0.0 and any(
+        inside(flux[1:], x, y, z, margin) for x, y, z in points
+    )
+
+
+def _gone(flux: Array, length_mm: float, load: float, tip: Array) -> SpatialSolution:
+    none = np.zeros((0, 3))
+    return SpatialSolution(
+        s_mm=np.zeros(0), r_mm=none, directors=np.zeros((0, 3, 3)),
+        curvature_per_mm=none, status=PULLED_IN, morse_index=-1,
+        error_mm=math.nan, flux_tip_mT=_flux_mT(flux, tip),
+        root_moment_Nm=(0.0, 0.0, 0.0), load_limit=load,
+    )  # fmt: skip
+
+
+def _flux_mT(flux: Array, point: Array) -> Vector:
+    b = np.zeros(12)
+    flux_at(flux, point[0], point[1], point[2], b)
+    return mT_from_T(b[0]), mT_from_T(b[1]), mT_from_T(b[2])
+
+
+def _solution(
+    rod: SpatialRod, table: Array, flux: Array, s: Array, states: Array,
+    index: int, error: float,
+) -> SpatialSolution:  # fmt: skip
+    L = rod.length_mm
+    directors = states[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1)
+    joints = np.cumsum([part.length_mm for part in rod.sections])[:-1] / L
+    row = table[::-1][np.searchsorted(joints, s, side="right")]
+    curvature = states[:, 9:12] * row[:, C1 : C3 + 1] + row[:, K1 : K3 + 1]
+    unit_Nm = rod.sections[0].stiffness_Nmm2[1] / L * 1e-3
+    moment = directors[0].T @ states[0, 9:12] * unit_Nm
+    return SpatialSolution(
+        s_mm=s * L,
+        r_mm=states[:, 12:15] * L,
+        directors=directors,
+        curvature_per_mm=curvature / L,
+        status=STABLE if index == 0 else UNSTABLE,
+        morse_index=index,
+        error_mm=error * L,
+        flux_tip_mT=_flux_mT(flux, states[-1, 12:15]),
+        root_moment_Nm=(float(moment[0]), float(moment[1]), float(moment[2])),
+    )
