@@ -2,9 +2,9 @@
 
 The curve is p(s) = p0 + integral of (cos theta, sin theta), so its parameter is arc
 length without any later correction. Measured points pull along the normal only. Knots
-are dense (about one a rod width); what keeps the fit smooth is a penalty on theta'''
-(so that a curvature which changes evenly, as at the root, is left alone), whose weight is the most likely one (restricted maximum likelihood, Wood 2011). Joints
-of known place get triple knots: theta stays continuous there and the curvature may
+are dense (about one a rod width); what keeps the fit smooth is a penalty on
+theta''' (a curvature that changes evenly, as at the root, is left alone), whose weight
+is the most likely one (restricted maximum likelihood, Wood 2011). Joints of known place get triple knots: theta stays continuous there and the curvature may
 jump. The covariance is the Bayesian one of Wahba (1983), which covers the bias of
 smoothing on average, widened by the correlation seen in the residuals.
 
@@ -172,7 +172,8 @@ def fit_curve(
     knots = _knots(s[0], s[-1], spacing, joints)
     basis, slopes = _design(knots, s)
     basis_mid, _ = _design(knots, 0.5 * (s[1:] + s[:-1]))
-    penalty = _penalty(knots)
+    bends = _bends(knots)
+    penalty = bends.T @ bends
     if theta is None:
         theta = _chord_angles(points)
     start = basis.T @ basis + 1e-3 * penalty * spacing**5
@@ -180,15 +181,12 @@ def fit_curve(
     coefficients = np.linalg.solve(start, basis.T @ theta)
     weight = weights / max(float(weights.max()), 1e-12)
     origin = _origin(s, points, weight, basis_mid @ coefficients)
-    for turn in range(iterations):
+    for _ in range(iterations):
         curve = _integrate(s, origin, coefficients, basis, basis_mid, slopes)
         jacobian = _jacobian(curve, basis_mid, coefficients)
         residual = np.sum((points - curve.points) * curve.normals, axis=1)
         residual[weight == 0.0] = 0.0
-        if turn < 2:
-            strength = stiffness
-        system = _solve(jacobian, residual, weight, penalty, coefficients, strength)
-        strength = system.strength
+        system = _solve(jacobian, residual, weight, penalty, coefficients, stiffness)
         origin = origin + system.change[0] * curve.normals[0]
         coefficients = coefficients + system.change[1:]
     curve = _integrate(s, origin, coefficients, basis, basis_mid, slopes)
@@ -202,7 +200,6 @@ class _System:
     change: Array
     inverse_root: Array
     freedom: float
-    strength: float
 
 
 def _knots(first: float, last: float, spacing: float, joints: Sequence[float]) -> Array:
@@ -265,8 +262,8 @@ def _fill_basis(knots: Array, s: Array, basis: Array, slopes: Array) -> None:
             slopes[i, left] = 3.0 * rate
 
 
-def _penalty(knots: Array) -> Array:
-    """Integral of theta'''^2, exact: theta' is a parabola between knots."""
+def _bends(knots: Array) -> Array:
+    """Matrix B with |B c|^2 = integral of theta'''^2, which is constant between knots."""
     low, high = knots[_DEGREE:-_DEGREE - 1], knots[_DEGREE + 1:-_DEGREE]  # fmt: skip
     real = high > low
     low, length = low[real], (high - low)[real]
@@ -275,7 +272,7 @@ def _penalty(knots: Array) -> Array:
     _, slopes = _design(knots, inner.ravel())
     first, middle, last = slopes.reshape(len(low), 3, -1).transpose(1, 0, 2)
     bend = (first - 2.0 * middle + last) / (0.4 * length[:, None]) ** 2
-    return np.asarray((bend * length[:, None]).T @ bend)
+    return np.asarray(bend * np.sqrt(length)[:, None])
 
 
 def _chord_angles(points: Array) -> Array:
@@ -375,7 +372,7 @@ def _solve(
     growth = 1.0 + strength * d
     root = z / np.sqrt(growth)
     change = z @ ((force - strength * bend) / growth)
-    return _System(change, root, float(np.sum(1.0 / growth)), strength)
+    return _System(change, root, float(np.sum(1.0 / growth)))
 
 
 def _ridge(normal: Array) -> Array:

@@ -217,9 +217,10 @@ def _cross_lanes(
         level = 0.5 * (low + high)
         best = -1
         for k in range(columns - 1):
-            if light[i, k] < level <= light[i, k + 1] and abs(k + 0.5 - place) <= reach:
-                if best < 0 or abs(k + 0.5 - place) < abs(best + 0.5 - place):
-                    best = k
+            away = abs(k + 0.5 - place)
+            rises = light[i, k] < level <= light[i, k + 1] and away <= reach
+            if rises and (best < 0 or away < abs(best + 0.5 - place)):
+                best = k
         if best < 1 or best + 2 >= columns:
             continue
         a, b = light[i, best - 1], light[i, best]
