@@ -233,6 +233,12 @@ def _split(v: float, rod: PlanarRod) -> tuple[float, float]:
     return (-eps, 0.0) if v >= 0.0 else (eps, -2.0 * np.pi)
 
 
+def tip_angle_rad(rod: PlanarRod, v: float, turn: int) -> float:
+    """Return the tip's angle from +x that a scan variable stands for."""
+    w_tip, base = _split(v, rod)
+    return float(w_tip + base + rod.pull_rad - 2.0 * np.pi * turn + rod.clamp_rad)
+
+
 def _grid(rod: PlanarRod, load: float) -> Array:
     """Scan points: dense enough for every swing, reaching beyond every tip angle."""
     swings = rod.size * load**0.5
