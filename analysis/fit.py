@@ -39,6 +39,11 @@ Array = NDArray[np.float64]
 DEGENERATE_SD = 0.5
 """Relative standard deviation along a direction from which on it counts as unknown."""
 
+BEYOND_BELIEF = 8.0
+"""Prior standard deviations of a nuisance beyond which it must be another rod."""
+
+WRONG_ROD = "; is it the right specimen, with the right sign of its remanence?"
+
 PRIOR_RANGE_MPA = (8.0, 50.0)
 """The paper's range for the material, from its own earlier work."""
 
@@ -244,12 +249,18 @@ def _search(
 
     start = np.clip(np.linalg.solve(turn, -offset), lower + 1e-3, upper - 1e-3)
     cache: dict[bytes, tuple[Array, Array]] = {}
+    # What is refused at the start is wrong with the input and is told; later on it is
+    # the search that went where nothing can be solved.
+    cache[start.tobytes()] = first = evaluate(start)
 
     def both(v: Array) -> tuple[Array, Array]:
         key = v.tobytes()
         if key not in cache:
             cache.clear()
-            cache[key] = evaluate(v)
+            try:
+                cache[key] = evaluate(v)
+            except MagbendError:
+                cache[key] = np.full_like(first[0], WALL), np.zeros_like(first[1])
         return cache[key]
 
     bounded = bool(np.any(np.isfinite(lower)) or np.any(np.isfinite(upper)))
@@ -268,9 +279,16 @@ def _search(
     unknowns = np.asarray(turn @ found.x + offset)
     if found.status <= 0 or np.max(np.abs(found.fun)) >= WALL:
         raise SolverError(
-            f"the fit does not converge in {found.nfev} evaluations "
-            f"({found.message}); is it the right specimen, with the right sign of its "
-            "remanence?"
+            f"the fit does not converge in {found.nfev} evaluations ({found.message})"
+            f"{WRONG_ROD}"
+        )
+    p = len(problem.names)
+    if len(unknowns) > p and np.max(np.abs(unknowns[p:])) > BEYOND_BELIEF:
+        k = int(np.argmax(np.abs(unknowns[p:])))
+        value, sd = unknowns[p + k] * problem.nuisance_sd[k], problem.nuisance_sd[k]
+        raise SolverError(
+            f"the measured shapes do not fit this rod: {problem.nuisances[k][0]} would "
+            f"have to be {value:.3g}, which is known to be 0 +- {sd:.2g}{WRONG_ROD}"
         )
     return unknowns
 

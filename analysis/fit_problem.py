@@ -26,7 +26,7 @@ from .metrics import position_at
 
 Array = NDArray[np.float64]
 
-SIGMA_FLOOR_MM = 0.002
+SIGMA_FLOOR_MM = 0.001
 """Least standard deviation of a measured point: below it the camera's pixels, the
 paper and the lens model decide, which no centreline knows of."""
 

@@ -1,0 +1,244 @@
+"""The fit finds hidden moduli with intervals that hold, and names what it cannot."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from analysis_factory import MAGNET, write_run
+
+from magbend import sim
+from magbend.analysis import fit_runs, load_run
+from magbend.analysis.fit import write_fit
+from magbend.analysis.fit_problem import Nuisance, build_problem, residuals
+from magbend.core.errors import InputError, SolverError, StoreError
+from magbend.core.specimen import Specimen
+
+HELD = Nuisance(
+    clamp_angle_deg=0.0,
+    clamp_position_mm=0.0,
+    frame_angle_deg=0.0,
+    scale_percent=0.0,
+    magnet_percent=0.0,
+)
+
+
+def hidden(nominal: Specimen, *factors: float) -> Specimen:
+    sections = tuple(
+        replace(section, E_MPa=section.E_MPa * factor)
+        for section, factor in zip(nominal.sections, factors, strict=True)
+    )
+    return replace(nominal, sections=sections)
+
+
+def noisy_run(path: Path, seed: int) -> tuple[Path, Specimen]:
+    """Hide what a bench may have and not know: see `Nuisance` for the priors."""
+    rng = np.random.default_rng(seed)
+    nominal = sim.gmc(1 + seed % 7)
+    truth = hidden(nominal, *np.exp(0.1 * rng.standard_normal(3)))
+    magnet = replace(
+        MAGNET,
+        remanence_T=1.3 * (1.0 + 0.01 * rng.standard_normal()),
+        axis_angle_deg=90.0 + 0.5 * rng.standard_normal(),
+        offset_mm=(
+            0.3 * float(rng.standard_normal()),
+            0.1 * float(rng.standard_normal()),
+            0.0,
+        ),
+    )
+    write_run(
+        path,
+        specimen=nominal,
+        truth=truth,
+        magnet=magnet,
+        clamp_angle_deg=0.4 * rng.standard_normal(),
+        sigma_mm=0.01,
+        frame_error=(0.03, 0.12, 0.001),
+        flux_noise_mT=0.1,
+        rng=rng,
+    )
+    return path, truth
+
+
+def coverage(folder: Path, seeds: range) -> tuple[float, float, int]:
+    """Return the shares of moduli in their 95 % and 68 % intervals, and the count."""
+    scores = []
+    for seed in seeds:
+        path, truth = noisy_run(folder / str(seed), seed)
+        fit = fit_runs([load_run(path)])
+        for k, section in enumerate(truth.sections):
+            if f"E_MPa[{k}]" not in fit.not_identifiable:
+                scores.append((fit.E_MPa[k] - section.E_MPa) / fit.E_sd_MPa[k])
+    z = np.abs(scores)
+    return float(np.mean(z < 1.96)), float(np.mean(z < 1.0)), len(z)
+
+
+def test_intervals_hold_the_true_moduli_over_200_runs(tmp_path: Path) -> None:
+    within_95, within_68, count = coverage(tmp_path, range(200))
+    print(f"{count} moduli: {within_95:.1%} in 95 %, {within_68:.1%} in 68 %")
+    assert count >= 550
+    assert within_95 >= 0.93
+    # An interval that is far too wide would be no merit.
+    assert within_68 <= 0.95
+
+
+def test_without_noise_the_moduli_are_exact(tmp_path: Path) -> None:
+    nominal = sim.gmc(2)
+    truth = hidden(nominal, 1.1, 0.9, 1.2)
+    run = load_run(write_run(tmp_path / "a", specimen=nominal, truth=truth))
+    fit = fit_runs([run], nuisance=HELD)
+    assert fit.E_MPa == pytest.approx([22.0, 13.5, 12.0], rel=1e-4)
+    assert fit.not_identifiable == ()
+    assert fit.specimen.sections[0].E_MPa == fit.E_MPa[0]
+
+
+def test_jacobian_is_that_of_the_residuals(tmp_path: Path) -> None:
+    rod = replace(sim.gmc(2), density_kg_m3=2640.0)
+    support = sim.Support(gravity_m_s2=(0.0, -9.81, 0.0))
+    path = write_run(tmp_path / "a", specimen=rod, support=support)
+    problem = build_problem(
+        [load_run(path)],
+        free=["remanence_mT", "load_factor", "magnet_remanence_T"],
+        nuisance=Nuisance(weight_percent=2.0),
+        support=support,
+    )
+    rng = np.random.default_rng(1)
+    at = 0.1 * rng.standard_normal(problem.size)
+    _, jacobian = residuals(problem, at)
+    for k in range(problem.size):
+        step = np.zeros(problem.size)
+        step[k] = 1e-5
+        plus, minus = (residuals(problem, at + d)[0] for d in (step, -step))
+        size = np.max(np.abs(jacobian[:, k])) + 1e-9
+        difference = (plus - minus) / 2e-5
+        assert np.max(np.abs(jacobian[:, k] - difference)) < 1e-4 * size
+
+
+def test_modulus_and_remanence_together_are_refused(tmp_path: Path) -> None:
+    run = load_run(write_run(tmp_path / "a", sigma_mm=0.005))
+    fit = fit_runs([run], free=["remanence_mT"])
+    assert fit.not_identifiable == (
+        "E_MPa[0]", "E_MPa[1]", "E_MPa[2]", "remanence_mT",
+    )  # fmt: skip
+    assert all(math.isnan(value) for value in fit.values)
+    assert fit.condition_number > 1e5
+    ratio, sd = fit.ratios["E_MPa[0]/remanence_mT"]
+    assert abs(ratio - 20.0 / 20.07) < 3.0 * sd
+
+
+def test_weight_breaks_the_tie(tmp_path: Path) -> None:
+    """In-plane weight does not scale with the remanence: E and M part."""
+    nominal = replace(sim.gmc(2), density_kg_m3=2640.0)
+    truth = replace(hidden(nominal, 1.3, 1.3, 1.3), remanence_mT=1.2 * 20.07)
+    support = sim.Support(gravity_m_s2=(0.0, -9.80665, 0.0))
+    path = write_run(tmp_path / "a", specimen=nominal, truth=truth, support=support)
+    fit = fit_runs(
+        [load_run(path)], free=["remanence_mT"], support=support, nuisance=HELD
+    )
+    assert fit.not_identifiable == ()
+    assert fit.values == pytest.approx([26.0, 19.5, 13.0, 24.084], rel=1e-3)
+
+
+def test_free_load_factor_is_as_degenerate_as_the_remanence(tmp_path: Path) -> None:
+    run = load_run(write_run(tmp_path / "a"))
+    fit = fit_runs([run], free=["load_factor"])
+    assert "load_factor" in fit.not_identifiable
+    assert "raising E_MPa[0]" in fit.directions[0]
+
+
+def test_a_nearly_straight_rod_tells_no_modulus(tmp_path: Path) -> None:
+    """At 300 mm the rod hardly bends: the noise is larger than what E changes."""
+    run = load_run(write_run(tmp_path / "a", gaps_mm=[300.0], sigma_mm=0.05))
+    fit = fit_runs([run])
+    assert "E_MPa[2]" in fit.not_identifiable
+    assert math.isnan(fit.E_MPa[2])
+
+
+def test_several_runs_share_their_moduli(tmp_path: Path) -> None:
+    runs = []
+    for number in (1, 2, 3):
+        nominal = sim.gmc(number)
+        truth = hidden(nominal, 1.1, 0.95, 1.05)
+        path = tmp_path / str(number)
+        rng = np.random.default_rng(number)
+        write_run(path, specimen=nominal, truth=truth, sigma_mm=0.01, rng=rng)
+        runs.append(load_run(path))
+    alone = fit_runs(runs[1:2])
+    together = fit_runs(runs)
+    assert together.steps == 9
+    off = np.array(together.E_MPa) - [22.0, 14.25, 10.5]
+    assert np.all(np.abs(off) < 3.0 * np.array(together.E_sd_MPa))
+    assert np.all(np.array(together.E_sd_MPa) < np.array(alone.E_sd_MPa))
+
+
+def test_bounds_order_and_prior_are_kept(tmp_path: Path) -> None:
+    nominal = sim.gmc(2)
+    truth = hidden(nominal, 0.7, 1.2, 1.0)  # 14, 18, 10 MPa: rises, then falls
+    run = load_run(write_run(tmp_path / "a", specimen=nominal, truth=truth))
+    free = fit_runs([run], nuisance=HELD)
+    assert free.E_MPa[1] > free.E_MPa[0]
+    falling = fit_runs([run], nuisance=HELD, falling=True)
+    assert falling.E_MPa[0] >= falling.E_MPa[1] >= falling.E_MPa[2]
+    bounded = fit_runs([run], nuisance=HELD, bounds_MPa=(12.0, 16.0))
+    assert min(bounded.E_MPa) >= 12.0 - 1e-9
+    assert max(bounded.E_MPa) <= 16.0 + 1e-9
+    prior = fit_runs([run], prior_MPa=(8.0, 50.0))
+    assert prior.E_sd_MPa[2] <= fit_runs([run]).E_sd_MPa[2]
+
+
+def test_widening_a_prior_widens_the_intervals(tmp_path: Path) -> None:
+    run = load_run(write_run(tmp_path / "a", sigma_mm=0.01))
+    narrow = fit_runs([run], nuisance=HELD)
+    wide = fit_runs([run], nuisance=Nuisance(magnet_percent=5.0))
+    assert all(b > a for a, b in zip(narrow.E_sd_MPa, wide.E_sd_MPa, strict=True))
+    assert wide.E_sd_MPa[0] / wide.E_MPa[0] > 0.045
+
+
+def test_failed_frames_are_left_out_and_named(tmp_path: Path) -> None:
+    run = load_run(write_run(tmp_path / "a", failed=[0]))
+    fit = fit_runs([run])
+    assert fit.steps == 2
+    assert "step 0: failed frame" in fit.skipped[0]
+    with pytest.raises(StoreError, match="no step can be fitted"):
+        fit_runs([load_run(write_run(tmp_path / "b", failed=[0, 1, 2]))])
+
+
+def test_file_has_the_fixed_words(tmp_path: Path) -> None:
+    path = write_run(tmp_path / "a")
+    write_fit(path / "fit.json", fit_runs([load_run(path)], free=["remanence_mT"]))
+    data = json.loads((path / "fit.json").read_text())
+    assert data["E_MPa"] == [None, None, None]
+    for key in (
+        "E_sd_MPa", "correlation", "condition_number", "not_identifiable",
+        "chi2_reduced",
+    ):  # fmt: skip
+        assert key in data
+
+
+def test_what_cannot_be_is_refused(tmp_path: Path) -> None:
+    run = load_run(write_run(tmp_path / "a"))
+    with pytest.raises(InputError, match="free parameter must be one of"):
+        fit_runs([run], free=["colour"])
+    with pytest.raises(InputError, match="bounds_MPa"):
+        fit_runs([run], bounds_MPa=(50.0, 8.0))
+    with pytest.raises(InputError, match="weight"):
+        fit_runs([run], nuisance=Nuisance(weight_percent=1.0))
+    with pytest.raises(InputError, match="prior of scale_percent"):
+        Nuisance(scale_percent=-1.0)
+    other = load_run(write_run(tmp_path / "b", specimen=sim.gmc(4)))
+    with pytest.raises(StoreError, match="other nominal moduli"):
+        fit_runs([run, other])
+    heavy = sim.Support(gravity_m_s2=(0.0, -9.81, 0.0))
+    with pytest.raises(StoreError, match="density_kg_m3"):
+        fit_runs([run], support=heavy)
+
+
+def test_wrong_sign_of_the_remanence_ends_in_a_sentence(tmp_path: Path) -> None:
+    wrong = replace(sim.gmc(2), remanence_mT=-20.07)
+    run = load_run(write_run(tmp_path / "a", specimen=wrong, truth=sim.gmc(2)))
+    with pytest.raises(SolverError, match="sign of its remanence"):
+        fit_runs([run])
