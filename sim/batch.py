@@ -1,0 +1,315 @@
+"""`solve_many`: the tips of many designs at once, on all cores.
+
+Designs run in lanes (`batch_lanes`), and those that leave the lanes through the scalar
+solver, in chunks that a pool of threads takes one by one. Threads rather than numba's
+parallel layer: its fallback aborts when two callers meet and does not survive a fork,
+while kernels that release the interpreter run on all cores, let progress be told and a
+stop be asked between chunks, and load from the cache like any other. For whole shapes
+instead of tips see `batch_shapes.solve_shapes`.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor, as_completed
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from ..core.errors import InputError
+from ..core.magnet import Magnet
+from ..core.progress import Progress, silent
+from ..core.units import MU0
+from .batch_lanes import HARD, solve_magnet, solve_uniform
+from .fields import FLUX_LIMIT_T, PULLED_IN, STABLE, UNSTABLE
+from .magnet_field import magnet_block
+from .planar import GONE, OK_UNSTABLE, equilibrium, shape, sharpen, touches
+from .planar_march import MAX_ORDER, STATE
+
+Array = NDArray[np.float64]
+
+OUTCOMES = (STABLE, UNSTABLE, PULLED_IN, "not solved", "touches the magnet")
+"""Meaning of the codes in the column ``outcome``."""
+NOT_SOLVED = 3
+RESULT = np.dtype(
+    [
+        ("tip_x_mm", np.float64),
+        ("tip_y_mm", np.float64),
+        ("tip_angle_deg", np.float64),
+        ("error_mm", np.float64),
+        ("outcome", np.int8),
+        ("morse_index", np.int8),
+    ]
+)
+CHUNK = 4096
+_ORDER = 12
+_STEP = 0.4
+_LIMITS = {
+    "length_mm": (0.0, np.inf),
+    "E_MPa": (0.0, np.inf),
+    "side_mm": (0.0, np.inf),
+    "remanence_mT": (-FLUX_LIMIT_T * 1e3, FLUX_LIMIT_T * 1e3),
+    "flux_mT": (-FLUX_LIMIT_T * 1e3, FLUX_LIMIT_T * 1e3),
+    "angle_deg": (-36000.0, 36000.0),
+    "gap_mm": (0.0, np.inf),
+}
+_POSITIVE = ("length_mm", "E_MPa", "side_mm", "gap_mm")
+
+
+def solve_many(
+    designs: Mapping[str, ArrayLike] | NDArray[np.void],
+    *,
+    magnet: Magnet | None = None,
+    progress: Progress = silent,
+    stop: Callable[[], bool] | None = None,
+    threads: int | None = None,
+) -> NDArray[np.void]:
+    """Solve many weightless rods, clamped along +x, and return where their tips are.
+
+    Parameters
+    ----------
+    designs : mapping of arrays, or structured array
+        ``length_mm`` and ``E_MPa``, shape (n, sections) or (sections,), root first;
+        ``side_mm`` and ``remanence_mT``, shape (n, sections), (n,) or scalar; and
+        either ``flux_mT`` and ``angle_deg`` (90 by default), or ``gap_mm``, shape (n,)
+        or scalar.
+    magnet : Magnet, optional
+        The magnet to which ``gap_mm`` refers; in the plane of the rods.
+    progress : callable
+        Called as ``progress(done, total)``, from this thread.
+    stop : callable, optional
+        Asked now and then; when it says True the rest stays ``not solved``.
+    threads : int, optional
+        How many cores to use; all that this process may, by default.
+
+    Returns
+    -------
+    ndarray, shape (n,), with fields
+        ``tip_x_mm``, ``tip_y_mm``, ``tip_angle_deg``, ``error_mm`` (a bound),
+        ``outcome`` (index into `OUTCOMES`), ``morse_index``. Numbers are NaN, and the
+        index -1, where there is no shape.
+
+    Raises
+    ------
+    InputError
+        If a column is missing or of another length, or holds a value that cannot be.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from magbend.sim import solve_many
+    >>> tips = solve_many({"length_mm": [10, 10, 10], "E_MPa": [20, 15, 10],
+    ...     "side_mm": 1.0, "remanence_mT": 20.07, "flux_mT": [38.0, 50.0]})
+    >>> np.round(tips["tip_y_mm"], 3).tolist()
+    [3.621, 4.71]
+    """
+    columns = _columns(designs, magnet)
+    n = len(columns["side_mm"])
+    out = np.empty(n, dtype=RESULT)
+    for name in RESULT.names or ():
+        out[name] = np.nan if name not in ("outcome", "morse_index") else -1
+    out["outcome"] = NOT_SOLVED
+    workers = threads or _cores()
+    starts = list(range(0, n, CHUNK))
+
+    def work(start: int) -> int:
+        if stop is not None and stop():
+            return 0
+        rows = slice(start, min(start + CHUNK, n))
+        _solve_chunk({k: v[rows] for k, v in columns.items()}, magnet, out[rows])
+        return rows.stop - start
+
+    done = 0
+    if len(starts) == 1 or workers == 1:
+        for start in starts:
+            done += work(start)
+            progress(done, n)
+        return out
+    with ThreadPoolExecutor(workers) as pool:
+        for future in as_completed([pool.submit(work, start) for start in starts]):
+            done += future.result()
+            progress(done, n)
+    return out
+
+
+def _cores() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _columns(
+    designs: Mapping[str, ArrayLike] | NDArray[np.void], magnet: Magnet | None
+) -> dict[str, Array]:
+    """Return the columns, checked: those of sections (n, k), the others (n,)."""
+    given = designs.dtype.names if isinstance(designs, np.ndarray) else designs
+    names = set(given or ())
+    field = {"gap_mm"} if magnet is not None else {"flux_mT"}
+    wanted = {"length_mm", "E_MPa", "side_mm", "remanence_mT"} | field
+    known = wanted | (set() if magnet is not None else {"angle_deg"})
+    if not wanted <= names or not names <= known:
+        raise InputError(
+            f"designs must have the columns {', '.join(sorted(wanted))} in mm, MPa and "
+            f"mT (gap_mm with a magnet, flux_mT without); instead received "
+            f"{', '.join(sorted(names))}"
+        )
+    arrays = {name: np.asarray(designs[name], dtype=np.float64) for name in names}
+    arrays.setdefault("angle_deg", np.float64(90.0))  # type: ignore[arg-type]
+    if magnet is not None:
+        del arrays["angle_deg"]
+    wide = ("length_mm", "E_MPa")
+    counts = [
+        a.shape[0] for k, a in arrays.items() if a.ndim == (2 if k in wide else 1)
+    ]
+    counts += [a.shape[0] for k, a in arrays.items() if k not in wide and a.ndim == 2]
+    n = max(counts, default=1)
+    sections = arrays["length_mm"].shape[-1] if arrays["length_mm"].ndim else 0
+    for name, array in arrays.items():
+        _check(name, array)
+        full = (n, sections) if name in (*wide, "side_mm", "remanence_mT") else (n,)
+        if array.ndim == 1 and name in ("side_mm", "remanence_mT"):
+            array = array[:, None]
+        try:
+            arrays[name] = np.ascontiguousarray(np.broadcast_to(array, full))
+        except ValueError:
+            raise InputError(
+                f"designs: {name} must fit {n} designs of {sections} sections; instead "
+                f"received shape {array.shape}"
+            ) from None
+    return arrays
+
+
+def _check(name: str, array: Array) -> None:
+    low, high = _LIMITS[name]
+    good = np.isfinite(array) & (array >= low) & (array <= high)
+    if name in _POSITIVE:
+        good &= array > 0.0
+    if not np.all(good):
+        bad = float(array[~good].flat[0])
+        unit = name.rsplit("_", 1)[1]
+        what = "above zero" if name in _POSITIVE else f"from {low:g} to {high:g}"
+        raise InputError(
+            f"designs: every {name} must be {what} in {unit}; instead received {bad!r}"
+        )
+
+
+def _solve_chunk(
+    columns: dict[str, Array], magnet: Magnet | None, out: NDArray[np.void]
+) -> None:
+    """Solve one chunk into `out`."""
+    rods, total_mm, margins = _rods(columns)
+    # Rods that need equally many steps run side by side.
+    flux = np.abs(columns["flux_mT"]) * 1e-3 if magnet is None else np.ones(len(rods))
+    size = rods[:, :, 0] * np.sqrt(
+        rods[:, :, 1] * np.abs(rods[:, :, 2]) * flux[:, None]
+    )
+    order = np.argsort(np.ceil(2.0 * size.max(axis=1)), kind="stable")
+    rods, total_mm, margins = rods[order], total_mm[order], margins[order]
+    tips = np.empty((len(rods), 3))
+    error = np.empty(len(rods))
+    outcome = np.empty(len(rods), dtype=np.int8)
+    index = np.zeros(len(rods), dtype=np.int8)
+    if magnet is None:
+        flux_T = columns["flux_mT"][order] * 1e-3
+        angle = np.radians(columns["angle_deg"][order])
+        solve_uniform(rods, flux_T, angle, tips, outcome, error)
+        hard = np.flatnonzero(outcome == HARD)
+        fields = _uniform_fields(flux_T[hard], columns["angle_deg"][order][hard])
+    else:
+        fields = _magnet_fields(magnet, columns["gap_mm"][order], total_mm)
+        solve_magnet(rods, fields, margins, tips, outcome, error)
+        hard = np.flatnonzero(outcome == HARD)
+        fields = fields[hard]
+    if len(hard):
+        found = (tips[hard], outcome[hard], error[hard], index[hard])
+        _solve_hard(rods[hard], fields, margins[hard], *found)
+        tips[hard], outcome[hard], error[hard], index[hard] = found
+    out["tip_x_mm"][order] = tips[:, 0] * total_mm
+    out["tip_y_mm"][order] = tips[:, 1] * total_mm
+    out["tip_angle_deg"][order] = np.degrees(tips[:, 2])
+    out["error_mm"][order] = error * total_mm
+    out["outcome"][order] = outcome
+    out["morse_index"][order] = index
+
+
+def _rods(columns: dict[str, Array]) -> tuple[Array, Array, Array]:
+    """Return rods as `planar_march` takes them (n, k, 5), lengths, and margins."""
+    length = columns["length_mm"]
+    total = length.sum(axis=1)
+    side = columns["side_mm"]
+    EI = columns["E_MPa"] * side**4 / 12.0
+    rods = np.zeros((*length.shape, 5))
+    rods[:, ::-1, 0] = length / total[:, None]
+    rods[:, ::-1, 1] = EI[:, :1] / EI
+    moment = side**2 * columns["remanence_mT"] * (1e-9 / MU0)
+    rods[:, ::-1, 2] = moment * (total**2 / EI[:, 0])[:, None]
+    if not np.all(np.isfinite(rods)):
+        raise InputError(
+            "designs: length_mm, side_mm in mm and E_MPa in MPa must be of comparable "
+            "size; instead received a design whose loads overflow"
+        )
+    return rods, total, side.max(axis=1) / (2.0 * total)
+
+
+def _uniform_fields(flux_T: Array, angle_deg: Array) -> Array:
+    angle = np.radians(angle_deg)
+    fields = np.zeros((len(flux_T), 17))
+    fields[:, 1] = flux_T * np.where(angle_deg % 180.0 == 90.0, 0.0, np.cos(angle))
+    fields[:, 2] = flux_T * np.where(angle_deg % 180.0 == 0.0, 0.0, np.sin(angle))
+    return fields
+
+
+def _magnet_fields(magnet: Magnet, gap_mm: Array, total_mm: Array) -> Array:
+    if magnet.elevation_deg != 0.0 or magnet.offset_mm[2] != 0.0:
+        raise InputError(
+            "magnet elevation_deg in deg and offset_mm[2] in mm must be 0 for batches, "
+            f"which are planar; instead received {magnet.elevation_deg!r} deg and "
+            f"{magnet.offset_mm[2]!r} mm"
+        )
+    fields = np.empty((len(gap_mm), 17))
+    fields[:, 0] = 1.0
+    fields[:, 1:] = magnet_block(magnet, length_mm=0.0, gap_mm=0.0)
+    fields[:, 4:7] -= gap_mm[:, None] * np.array(magnet.axes()[2])
+    fields[:, 4] += total_mm
+    fields[:, 1:7] /= total_mm[:, None]
+    return fields
+
+
+@njit(cache=True, nogil=True)
+def _solve_hard(rods, fields, margins, tips, outcome, error, index):  # type: ignore[no-untyped-def]
+    """Solve the designs that left the lanes, one by one."""
+    X = np.empty(STATE)
+    D = np.empty((STATE, 4))
+    T = np.empty((4, MAX_ORDER + 1))
+    C = np.empty((MAX_ORDER + 1, 4, 4))
+    u = np.empty(4)
+    stations = np.linspace(0.0, 1.0, 41)
+    curve = np.empty((4, 41))
+    for i in range(rods.shape[0]):
+        u[0] = u[2] = u[3] = 0.0
+        u[1] = 1.0
+        tips[i] = np.nan
+        error[i] = np.nan
+        index[i] = -1
+        curve[0] = stations
+        curve[1] = 0.0
+        if touches(fields[i], curve[0], curve[1], margins[i]):
+            outcome[i] = 4
+            continue
+        found, zeros, _ = equilibrium(
+            rods[i], fields[i], 0.0, u, _ORDER, _STEP, X, D, T, C
+        )
+        outcome[i] = min(found, NOT_SOLVED)
+        if found > OK_UNSTABLE:
+            continue
+        wrong = sharpen(rods[i], fields[i], 0.0, u, _ORDER, _STEP, X, D, T, C)
+        shape(rods[i], fields[i], u, _ORDER + 4, _STEP, stations, X, D, T, C, curve)
+        if touches(fields[i], curve[0], curve[1], margins[i]):
+            outcome[i] = GONE
+            continue
+        index[i] = zeros
+        error[i] = wrong + 2e-14
+        for k in range(3):
+            tips[i, k] = curve[k, -1]
