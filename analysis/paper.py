@@ -103,7 +103,7 @@ def reproduce(out: Path, *, seed: int = 1, progress: Progress = silent) -> Repro
         If a run folder is there already.
     """
     from ..sim import gmc
-    from .demo import bench_run
+    from .twin_run import bench_run
 
     out.mkdir(parents=True, exist_ok=True)
     runs: list[RunComparison] = []

@@ -7,13 +7,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..core.errors import InputError, StoreError
+from ..core.errors import StoreError
 
 if TYPE_CHECKING:
     from ..rig.clock import Clock
     from ..rig.config import Plan
     from ..rig.devices import Devices
-    from ..rig.link import WireLog
 
 
 def needs_twin(plan: Plan) -> bool:
@@ -41,7 +40,8 @@ def open_bench(
     readings_mT : dict or None
         Typed readings per gap that replace the meter.
     twin_seed : int or None
-        Seed of the computed bench; None opens the real one.
+        Seed of the computed bench; None opens the real one. The computed bench leaves
+        a photograph of its calibration board as ``board.png``.
     camera : bool
         False where no picture is taken.
     """
@@ -61,21 +61,10 @@ def open_bench(
                 plan, clock, log=log, readings_mT=readings_mT, with_camera=camera
             )
         else:
-            devices = _open_twin(plan, clock, log, twin_seed)
+            from ..analysis.twin_run import open_twin_bench, photograph_board
+
+            bench, devices = open_twin_bench(plan, seed=twin_seed, clock=clock, log=log)
         with contextlib.closing(devices):
             yield devices
-
-
-def _open_twin(plan: Plan, clock: Clock, log: WireLog, seed: int) -> Devices:
-    from ..analysis.twin import TwinBench
-    from ..rig.virtual.bench import open_twin
-
-    if plan.rig.magnet is None:
-        raise InputError(
-            f"{plan.rig_path}: the computed bench needs a magnet; add the table "
-            f"[magnet] with side_mm and remanence_T"
-        )
-    bench = TwinBench(plan.specimen, plan.rig.magnet.magnet(), seed=seed)
-    return open_twin(
-        plan.rig, bench.photograph, bench.flux_mT, seed=seed, clock=clock, log=log
-    )
+        if twin_seed is not None and camera:
+            photograph_board(bench, folder / "board.png")
