@@ -263,7 +263,7 @@ def _fill_basis(knots: Array, s: Array, basis: Array, slopes: Array) -> None:
 
 
 def _bends(knots: Array) -> Array:
-    """Matrix B with |B c|^2 = integral of theta'''^2, which is constant between knots."""
+    """Return B with |B c|^2 the integral of theta'''^2, constant between knots."""
     low, high = knots[_DEGREE:-_DEGREE - 1], knots[_DEGREE + 1:-_DEGREE]  # fmt: skip
     real = high > low
     low, length = low[real], (high - low)[real]

@@ -31,7 +31,7 @@ def refusal(photo: Photo, refined: Refined, candidate: Candidate) -> None:
             f"the measured axis is {length:.0f} px long, but the dark thing it belongs "
             f"to {candidate.length_px:.0f} px",
         )
-    if refined.good.mean() < 0.6:
+    if refined.good.mean() < 0.5:
         raise LostError(
             "edges_lost",
             f"only {100 * refined.good.mean():.0f} % of the rod has two clear edges",
@@ -61,6 +61,8 @@ def doubts(
         flags.append("overexposed")
     if _shadow(refined) > 0.02:
         flags.append("shadow")
+    if refined.good.mean() < 0.8 or refined.fit.noise > 0.02 * result.width_px:
+        flags.append("rough_edges")
     if refined.tip.scatter > 0.5 or abs(refined.tip.skew) > 0.2:
         flags.append("ragged_tip")
     length = result.length_mm

@@ -83,6 +83,7 @@ class _State:
     blur: float
     first: float
     last: float
+    scatter: float = 0.0
 
 
 def refine(
@@ -130,7 +131,7 @@ def _pass(
     curve, width = state.curve, state.width
     reach = min(0.35 * width, 6.0 + 0.1 * width)
     if turn:
-        reach = min(max(3.0, 3.0 * state.blur), 0.45 * width)
+        reach = min(max(3.0, 3.0 * state.blur, 4.0 * state.scatter), 0.45 * width)
     edges = find_edges(
         grey, curve.points, curve.normals, state.low, state.high,
         reach=reach, blur=state.blur, sign=sign,
@@ -144,6 +145,7 @@ def _pass(
     state.width = float(np.median(edges.width[good]))
     blur = edges.blur
     state.blur = float(np.clip(blur, 0.3, 0.5 * state.width)) if blur > 0 else 1.0
+    state.scatter = _scatter(edges)
     tip, lines, first = _ends(grey, state, edges, good, root, sign, turn)
     fit, used = _fit(
         state, edges, good, first, tip.s, joints, turn, clamped=root == "clamp"
@@ -172,6 +174,15 @@ def _usable(edges: Edges) -> NDArray[np.bool_]:
     return found & (np.abs(width - centre) < max(5.0 * spread, 0.6))
 
 
+def _scatter(edges: Edges) -> float:
+    """Return how much an edge jumps from one station to the next but four, px."""
+    jump = np.concatenate(
+        [edges.low[5:] - edges.low[:-5], edges.high[5:] - edges.high[:-5]]
+    )
+    jump = jump[np.isfinite(jump)]
+    return 1.05 * float(np.median(np.abs(jump))) if jump.size else 0.0
+
+
 def _ends(
     grey: Image, state: _State, edges: Edges, good: NDArray[np.bool_],
     root: Root, sign: float, turn: int,
@@ -181,9 +192,11 @@ def _ends(
     reach = 1.3 * width if turn == 0 else 0.3 * width + 2.0
     near = good & (curve.s > curve.s[-1] - 3.0 * width)
     middle = float(np.median(edges.middle[near])) if near.any() and turn == 0 else 0.0
+    end = good & (curve.s > curve.s[-1] - 1.5 * width)
+    taper = float(np.median(edges.width[end])) if end.sum() > 3 else width
     tip = find_tip(
-        grey, curve, expected=state.last + outwards, width=width, blur=state.blur,
-        reach=reach, middle=middle, sign=sign,
+        grey, curve, expected=state.last + outwards, width=min(width, taper),
+        blur=state.blur, reach=reach, middle=middle, sign=sign,
     )  # fmt: skip
     if tip is None:
         raise LostError("no_tip", "the free end of the rod has no edge")
