@@ -99,10 +99,10 @@ def test_a_hundred_kills_lose_nothing(plan_file: Path, tmp_path: Path) -> None:
     ("phase", "line", "delay_s", "number"),
     [
         ("homing", "homing", 0.1, signal.SIGINT),
-        ("moving", "step 1 of", 0.1, signal.SIGINT),
-        ("moving", "step 1 of", 0.1, signal.SIGTERM),
-        ("settling", "step 1 of", 0.3, signal.SIGINT),
-        ("photographing", "step 1 of", 0.42, signal.SIGINT),
+        ("moving", "step 1 of", 0.04, signal.SIGINT),
+        ("moving", "step 1 of", 0.04, signal.SIGTERM),
+        ("settling", "step 1 of", 0.1, signal.SIGINT),
+        ("photographing", "step 1 of", 0.14, signal.SIGINT),
     ],
 )
 def test_interrupts_end_the_run_in_three_seconds(
@@ -114,7 +114,7 @@ def test_interrupts_end_the_run_in_three_seconds(
     number: signal.Signals,
 ) -> None:
     out = tmp_path / "out"
-    with start(with_gaps(plan_file), out, "--pace", "0.15") as process:
+    with start(with_gaps(plan_file), out, "--pace", "0.05") as process:
         while not process.stdout.readline().startswith(line):
             pass
         deadline_s = time.monotonic() + delay_s

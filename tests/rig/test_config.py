@@ -1,0 +1,115 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from magbend.core.errors import ConfigError, StoreError
+from magbend.rig.config import SettleConfig, read_plan, read_rig
+from magbend.rig.dry_run import homing_s, plan_steps
+from magbend.rig.template import write_templates
+
+
+def test_a_plan_brings_its_rig_and_specimen(plan_file: Path) -> None:
+    plan = read_plan(plan_file)
+    assert plan.gaps_mm == (70.0, 60.0, 50.0)
+    assert plan.specimen.name == "GMC 2"
+    assert plan.rig.limits.min_gap_mm == 40.0
+    assert plan.rig.magnet.magnet().sides_mm == (55.0, 55.0, 55.0)
+    assert plan.settle.frames == 3
+    assert "specimen" not in plan.as_dict()
+
+
+def test_a_specimen_may_stand_in_the_plan(plan_file: Path) -> None:
+    text = plan_file.read_text().replace('specimen = "specimen.toml"\n', "")
+    inline = '[specimen]\nname = "own"\nside_mm = 1.0\nremanence_mT = 20.0\n'
+    section = "[[specimen.section]]\nlength_mm = 12.0\nE_MPa = 9.0\n"
+    plan_file.write_text(text + inline + section)
+    assert read_plan(plan_file).specimen.length_mm == 12.0
+    plan_file.write_text(text + inline.replace("side_mm", "side") + section)
+    with pytest.raises(ConfigError, match=r"line \d+: unknown key 'specimen.side'; th"):
+        read_plan(plan_file)
+
+
+def test_settle_falls_back_to_the_rig_and_then_to_defaults(plan_file: Path) -> None:
+    text = plan_file.read_text()
+    plan_file.write_text(text[: text.index("[settle]")])
+    assert read_plan(plan_file).settle == SettleConfig()
+    rig = plan_file.with_name("rig.toml")
+    rig.write_text(rig.read_text() + "[settle]\ntime_s = 9.0\n")
+    assert read_plan(plan_file).settle.time_s == 9.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        (
+            "[70.0, 60.0, 50.0]",
+            "[70.0, 60.0, 30]",
+            r"plan.toml, line 6: gaps_mm\[2\] = 30 mm is under the interlock of 40 mm "
+            r"\(rig.toml, limits.min_gap_mm\)",
+        ),
+        ("[70.0, 60.0, 50.0]", "[200, 60]", r"gaps_mm\[0\] = 200 mm is beyond"),
+        ("[70.0, 60.0, 50.0]", "[70, 70]", "must fall"),
+        ("[70.0, 60.0, 50.0]", "[60, 70]", "far side"),
+        ("[70.0, 60.0, 50.0]", "[]", "line 6: gaps_mm"),
+        ("[70.0, 60.0, 50.0]", "[-70]", "line 6: gaps_mm.0"),
+        ("[70.0, 60.0, 50.0]", "[nan]", "line 6: gaps_mm.0"),
+        ("[70.0, 60.0, 50.0]", '["70 mm"]', "line 6: gaps_mm.0"),
+        ("gaps_mm =", "gaps =", "line 6: unknown key 'gaps'; the unit is missing"),
+        ("timeout_s = 20.0", "timeout = 20.0", "unknown key 'settle.timeout'"),
+        ("frames = 3", "frames = 1", "settle.frames"),
+        ('specimen = "specimen.toml"', 'specimen = "no.toml"', "no.toml: there is no"),
+        ('rig = "rig.toml"', 'rig = "no.toml"', "no.toml: there is no such file"),
+        ('rig = "rig.toml"\n', "", "'rig' is missing"),
+        ('name = "gmc2"', "name = ", "not valid TOML"),
+    ],
+)
+def test_a_wrong_plan_is_one_sentence(plan_file, old, new, sentence) -> None:
+    text = plan_file.read_text()
+    assert old in text
+    plan_file.write_text(text.replace(old, new))
+    with pytest.raises(ConfigError, match=sentence) as caught:
+        read_plan(plan_file)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ('backend = "twin"', 'backend = "webcam"', "camera.backend"),
+        ("min_gap_mm = 40.0", "min_gap = 40.0", "the unit is missing"),
+        ("side_mm = 55.0\n", "", "either side_mm"),
+        ("[limits]", "[limit]", "unknown key 'limit'; did you mean 'limits'"),
+        ('driver = "twin"', 'driver = "twin"\nsign = 2', "meter.sign"),
+    ],
+)
+def test_a_wrong_rig_is_one_sentence(plan_file, old, new, sentence) -> None:
+    rig = plan_file.with_name("rig.toml")
+    text = rig.read_text()
+    assert old in text
+    rig.write_text(text.replace(old, new))
+    with pytest.raises(ConfigError, match=sentence):
+        read_rig(rig)
+
+
+def test_the_dry_run_adds_up(plan_file: Path) -> None:
+    plan = read_plan(plan_file)
+    steps = plan_steps(plan)
+    assert [step.stage_mm for step in steps] == [-80.0, -90.0, -100.0]
+    assert [step.move_mm for step in steps] == [79.0, 10.0, 10.0]
+    # 10 mm at 5 mm/s, half a second to speed up and down, then the fixed times.
+    assert steps[1].time_s > 2.5 + plan.settle.time_s
+    assert homing_s(plan) > 0.0
+
+
+@pytest.mark.parametrize("twin", [False, True])
+def test_templates_are_valid_and_never_overwrite(tmp_path: Path, twin: bool) -> None:
+    folder = tmp_path / "bench"
+    paths = write_templates(folder, twin=twin)
+    plan = read_plan(folder / "plan.toml")
+    assert plan.specimen.length_mm == 30.0
+    assert plan.rig.camera.backend == ("twin" if twin else "auto")
+    assert all("#" in path.read_text() for path in paths)
+    with pytest.raises(StoreError, match="is not overwritten"):
+        write_templates(folder)
