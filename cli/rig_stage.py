@@ -254,6 +254,7 @@ def _facts(stage: GapStage) -> dict[str, Any]:
         "allowed_mm": [low, high],
         "port": identity.port,
         "firmware": identity.firmware,
+        "notes": list(identity.notes),
     }
 
 
@@ -276,7 +277,8 @@ def _screen(data: dict[str, Any]) -> str:
         rows["to do"] = "home it (magbend rig home), or magbend rig unlock"
     elif data["position_state"] != "homed":
         rows["to do"] = "home it: magbend rig home"
-    return "\n".join(f"{name:<10}{text}" for name, text in rows.items())
+    lines = [f"{name:<10}{text}" for name, text in rows.items()]
+    return "\n".join(lines + [f"note      {note}" for note in data["notes"]])
 
 
 def _line(data: dict[str, Any]) -> str:

@@ -24,6 +24,7 @@ from .stage import (
     StageIdentity,
     StageLimits,
     StageState,
+    StageTimeoutError,
 )
 from .stage_config import LimitsConfig, StageConfig
 
@@ -233,9 +234,7 @@ class GapStage:
         feed = self._config.feed_mm_min if feed_mm_min is None else feed_mm_min
         self._require_room_to_stop(feed)
         self._require_homed()
-        here = self.status().gap_mm
-        if here is None:
-            raise PositionLostError("the stage does not report a position; home it")
+        here = self._here_mm()
         legs, approach = self._legs(here, gap_mm)
         start_s = self._clock.monotonic_s()
         self._from_far_side = False
@@ -331,6 +330,17 @@ class GapStage:
     def close(self) -> None:
         """Let go of the port."""
         self._stage.close()
+
+    def _here_mm(self) -> float:
+        status = self._stage.status()
+        if status.trouble is not None:
+            raise status.trouble
+        self._require_homed()
+        if status.machine_mm is None:
+            raise StageTimeoutError(
+                "the stage does not answer; look at cable and power"
+            )
+        return self.to_gap_mm(status.machine_mm)
 
     def _move(self, gap_mm: float, feed_mm_min: float, moved: Moved | None) -> None:
         machine_mm = self.to_machine_mm(gap_mm)

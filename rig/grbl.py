@@ -79,6 +79,7 @@ class GrblStage:
         self._position: PositionState = "unknown"
         self._restarts = 0
         self._standing_at: Triple | None = None
+        self._undisturbed = False
 
     @property
     def position_state(self) -> PositionState:
@@ -139,7 +140,9 @@ class GrblStage:
             port=port,
             details=found.details,
             settings=found.settings,
+            notes=tuple(grbl_audit.notes(found.settings)),
         )
+        self._undisturbed = found.undisturbed
         left_at = presence.recall()
         self._standing_at = session.machine()
         if left_at and found.undisturbed and self._is_at(left_at):
@@ -245,22 +248,18 @@ class GrblStage:
         session = self._require_session()
         report = session.ask()
         self._notice_restart(session)
-        if report is None:
-            state = "alarm" if session.alarm is not None else "silent"
-            return StageStatus(
-                state=state,  # type: ignore[arg-type]
-                position_state=self._position,
-                alarm=session.alarm,
-            )
+        code = session.alarm
+        state = report.state if report else "silent" if code is None else "alarm"
         return StageStatus(
-            state=report.state,  # type: ignore[arg-type]
-            substate=report.substate,
-            machine_mm=self._machine_mm(),
+            state=state,  # type: ignore[arg-type]
+            substate=report.substate if report else None,
+            machine_mm=self._machine_mm() if report or session.deaf else None,
             position_state=self._position,
-            feed_mm_min=report.feed,
-            alarm=session.alarm,
-            pins=report.pins,
-            raw=report.raw,
+            feed_mm_min=report.feed if report else 0.0,
+            alarm=code,
+            trouble=session.alarm_error(code) if code is not None else None,
+            pins=report.pins if report else "",
+            raw=report.raw if report else "",
         )
 
     def stop_requested(self) -> bool:
@@ -325,10 +324,7 @@ class GrblStage:
             If the board does not come back.
         """
         if self._link is None or not self._link.is_open:
-            kept = self._position
-            self.connect()
-            if self._position == "homed" or kept != "unknown":
-                self._position = "unverified"
+            self._reconnect()
             return
         session = self._require_session()
         report = session.ask()
@@ -338,6 +334,17 @@ class GrblStage:
         elif not session.reset():
             raise StageTimeoutError("the stage does not answer a reset; cut its power")
         self._notice_restart(session)
+
+    def _reconnect(self) -> None:
+        """Open the port again; what had been known of the position is unverified."""
+        before = self._position
+        try:
+            self.connect()
+        except StageError:
+            self._position = before
+            raise
+        trusted = before != "unknown" and self._undisturbed
+        self._position = "unverified" if trusted else "unknown"
 
     def unlock(self) -> None:
         """Send ``$X``; the position is ``homed`` only if the alarm kept it."""

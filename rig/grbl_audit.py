@@ -86,6 +86,21 @@ def _audit_flags(settings: Settings, config: StageConfig) -> str | None:
     return None
 
 
+def notes(settings: Settings) -> list[str]:
+    """Return what the board allows but a bench should not: sentences for people."""
+    found = []
+    if number(settings, "1") != 255:
+        found.append(
+            "$1 is not 255: the motors are switched off after each move and a rod or a "
+            "magnet may pull the stage away; type $1=255"
+        )
+    if not number(settings, "20"):
+        found.append("$20 (soft limits) is off; limits are checked by the host alone")
+    if not number(settings, "21"):
+        found.append("$21 (hard limits) is off; the switches stop nothing but homing")
+    return found
+
+
 def limits_of(settings: Settings, config: StageConfig) -> StageLimits:
     """Return step, ceilings and travel of the axis, after the audit passed.
 

@@ -87,6 +87,8 @@ class StageStatus:
         Present speed in mm/min.
     alarm : int or None
         The alarm that locks the controller, if any.
+    trouble : StageError or None
+        What keeps the controller from moving, ready to be raised.
     pins : str
         Letters of the active inputs: ``X`` is the limit switch of axis X.
     raw : str
@@ -99,6 +101,7 @@ class StageStatus:
     machine_mm: float | None = None
     feed_mm_min: float = 0.0
     alarm: int | None = None
+    trouble: StageError | None = None
     pins: str = ""
     raw: str = ""
 
@@ -142,6 +145,7 @@ class StageIdentity:
     port: str
     details: tuple[str, ...] = ()
     settings: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
 
 Moved = Callable[[float], None]

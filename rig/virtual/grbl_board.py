@@ -48,6 +48,15 @@ class GrblBoard:
         The mechanics; by default those of the recording.
     settings : mapping of int to float, optional
         Settings that differ from the defaults of the generic build.
+
+    Attributes
+    ----------
+    now_s : float
+        The board's time.
+    plugged, port_taken, restart_on_open : bool
+        The cable is in; a program has the port open; opening restarts the board.
+    latency_s : float
+        Delay of everything it says.
     """
 
     def __init__(
@@ -61,7 +70,8 @@ class GrblBoard:
         self._order = itertools.count()
         self._out: deque[tuple[float, bytes]] = deque()
         self._rx_free_s = self._tx_free_s = self._blocked_s = 0.0
-        self._deaf_until_s = 0.0
+        self._deaf_until_s = self._mute_until_s = 0.0
+        self.latency_s = 0.0
         self.plugged = True
         self.port_taken = False
         self.restart_on_open = False
@@ -92,8 +102,10 @@ class GrblBoard:
         return b"".join(parts)
 
     def send(self, data: bytes) -> None:
-        """Put bytes on the line to the host."""
-        start_s = max(self.now_s, self._tx_free_s)
+        """Put bytes on the line to the host; garbage too, if a test wants it."""
+        if self.now_s < self._mute_until_s:
+            return
+        start_s = max(self.now_s + self.latency_s, self._tx_free_s)
         for piece in data.splitlines(keepends=True):
             start_s += len(piece) * _BYTE_S
             self._out.append((start_s, piece))
@@ -102,6 +114,14 @@ class GrblBoard:
     def at(self, time_s: float, action: Callable[[], None]) -> None:
         """Do something at a time of the board."""
         heapq.heappush(self._events, (time_s, next(self._order), action))
+
+    def lose_input(self, duration_s: float) -> None:
+        """Lose what the host sends for a while."""
+        self._deaf_until_s = self.now_s + duration_s
+
+    def lose_output(self, duration_s: float) -> None:
+        """Lose what the board says for a while."""
+        self._mute_until_s = self.now_s + duration_s
 
     def power_cycle(self, *, boot_s: float = 0.0) -> None:
         """Cut the power and give it back: settings stay, the position does not.
