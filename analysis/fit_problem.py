@@ -26,7 +26,7 @@ from .metrics import position_at
 
 Array = NDArray[np.float64]
 
-SIGMA_FLOOR_MM = 0.001
+SIGMA_FLOOR_MM = 0.002
 """Least standard deviation of a measured point: below it the camera's pixels, the
 paper and the lens model decide, which no centreline knows of."""
 
@@ -49,7 +49,7 @@ class Nuisance:
 
     clamp_angle_deg: float = 1.0
     clamp_position_mm: float = 0.05
-    frame_angle_deg: float = 0.15
+    frame_angle_deg: float = 0.3
     scale_percent: float = 0.2
     magnet_percent: float = 0.5
     weight_percent: float = 0.0
