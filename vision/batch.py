@@ -34,6 +34,7 @@ _log = logging.getLogger(__name__)
 STATE_FILE = "extract.json"
 _CHECKPOINT_S = 20.0
 _CHUNK = 8
+_DOUBTFUL_SCALE = 5e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -134,7 +135,7 @@ def measure(photo: Photo, settings: Settings) -> Measurement:
                 f"{settings.bare.size_px} and {photo.size_px} px",
             )
         photo = replace(photo, grey=_flattened(photo, settings.bare))
-    return extract(
+    found = extract(
         photo,
         settings.calibration,
         rod_height_mm=settings.rod_height_mm,
@@ -144,6 +145,18 @@ def measure(photo: Photo, settings: Settings) -> Measurement:
         clamp=settings.clamp,
         clamp_height_mm=settings.clamp_height_mm,
     )
+    if found.ok and _height_is_doubtful(settings):
+        return replace(found, flags=(*found.flags, "height_doubtful"))
+    return found
+
+
+def _height_is_doubtful(settings: Settings) -> bool:
+    """Whether the rod's height leaves the scale unknown by more than 0.05 %."""
+    if settings.calibration is None or settings.rod_height_mm == 0.0:
+        return False
+    camera = settings.calibration
+    doubt = camera.camera_height_sd_mm / camera.camera_height_mm**2
+    return math.isinf(doubt) or abs(settings.rod_height_mm) * doubt > _DOUBTFUL_SCALE
 
 
 def extract_files(

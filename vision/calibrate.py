@@ -167,6 +167,7 @@ def _calibration(
         scale_relative_sd=bundle.scale_relative_sd,
         rms_px=views[0].rms_px,
         rod_height_mm=rod_height_mm,
+        print_scale=board.print_scale,
         board=board.describe(),
         views=views,
     )

@@ -65,6 +65,8 @@ class Calibration:
         RMS distance of the corners of the plane photograph from the model.
     rod_height_mm : float
         Height of the rod's axis above the board's plane, taken when none is given.
+    print_scale : float
+        Measured over nominal length of the printed board, as it was taken into account.
     board, views : str, tuple of View
         The board as a sentence, and each photograph with its verdict.
     """
@@ -80,6 +82,7 @@ class Calibration:
     scale_relative_sd: float
     rms_px: float
     rod_height_mm: float = 0.0
+    print_scale: float = 1.0
     board: str = ""
     views: tuple[View, ...] = ()
 

@@ -45,6 +45,7 @@ class CalibrationModel(FileModel):
     scale_relative_sd: float | None
     rms_px: float | None
     rod_height_mm: float = 0.0
+    print_scale: float = 1.0
     board: str = ""
     views: tuple[ViewModel, ...] = ()
 
@@ -66,6 +67,7 @@ def save_calibration(calibration: Calibration, path: Path) -> None:
         "scale_relative_sd": _number(calibration.scale_relative_sd),
         "rms_px": _number(calibration.rms_px),
         "rod_height_mm": calibration.rod_height_mm,
+        "print_scale": calibration.print_scale,
         "board": calibration.board,
         "views": [
             {
@@ -101,6 +103,7 @@ def load_calibration(path: Path) -> Calibration:
         scale_relative_sd=_or(model.scale_relative_sd, math.nan),
         rms_px=_or(model.rms_px, math.nan),
         rod_height_mm=model.rod_height_mm,
+        print_scale=model.print_scale,
         board=model.board,
         views=tuple(
             View(

@@ -104,18 +104,8 @@ def _of_video(path: Path) -> list[Source]:
 
 def _with_distinct_names(sources: list[Source]) -> list[Source]:
     """Add the folder's name, then a number, to names that occur twice."""
-    unique = list(dict.fromkeys(sources))
-    for rename in (
-        lambda _, source: f"{source.path.parent.name}_{source.image}",
-        lambda index, source: f"{index:04d}_{source.image}",
-    ):
-        held = Counter(source.image for source in unique)
-        unique = [
-            source
-            if held[source.image] == 1
-            else replace(source, image=rename(index, source))
-            for index, source in enumerate(unique)
-        ]
+    unique = _renamed(list(dict.fromkeys(sources)), by_number=False)
+    unique = _renamed(unique, by_number=True)
     stems = Counter(_stem(source) for source in unique)
     return [
         replace(
@@ -125,6 +115,16 @@ def _with_distinct_names(sources: list[Source]) -> list[Source]:
         )
         for source in unique
     ]
+
+
+def _renamed(sources: list[Source], *, by_number: bool) -> list[Source]:
+    held = Counter(source.image for source in sources)
+    renamed = []
+    for index, source in enumerate(sources):
+        before = f"{index:04d}" if by_number else source.path.parent.name
+        image = f"{before}_{source.image}" if held[source.image] > 1 else source.image
+        renamed.append(replace(source, image=image))
+    return renamed
 
 
 def _stem(source: Source) -> str:

@@ -426,7 +426,9 @@ def expose(
     The noise is that of a colour mosaic: after its interpolation the three channels of
     a pixel rise and fall together.
     """
-    blurred = np.asarray(cv2.GaussianBlur(picture, (0, 0), light.blur_px))
+    blurred: Picture = np.asarray(
+        cv2.GaussianBlur(picture, (0, 0), light.blur_px), dtype=np.float32
+    )
     green = np.maximum(blurred[..., 1], np.float32(0.02)) / np.float32(PAPER[1])
     noise = rng.standard_normal(green.shape, dtype=np.float32)
     noise *= np.float32(_MOSAIC * light.noise) * np.sqrt(green)

@@ -327,6 +327,23 @@ def test_bare_frame_divides_the_light_out(tmp_path, good):
         extract_files([tmp_path / "x.png"], tmp_path / "out", settings=other)
 
 
+@pytest.mark.parametrize(
+    ("camera_height_mm", "rod_height_mm", "doubtful"),
+    [(None, 0.0, False), (None, 0.9, True), (330.0, 0.9, False), (60.0, 2.0, True)],
+)
+def test_height_that_cannot_be_corrected_is_flagged(
+    tmp_path, folder, camera_height_mm, rod_height_mm, doubtful
+):
+    calibration = scale_calibration(
+        mm_per_px=1.0 / SCALE, image_size_px=SIZE, camera_height_mm=camera_height_mm
+    )
+    settings = Settings(calibration=calibration, rod_height_mm=rod_height_mm)
+    (row,) = extract_files(
+        [folder / "b.png"], tmp_path / "out", settings=settings, overlays=False
+    ).frames
+    assert ("height_doubtful" in row.flags) is doubtful
+
+
 def test_edge_points_lie_half_a_width_from_the_axis(tmp_path, folder, good):
     path = tmp_path / "edges.csv"
     extract_files(
