@@ -33,6 +33,7 @@ logger = logging.getLogger(__name__)
 
 _RESET_TRIES = 8
 _BANNER_S = 2.5
+_PATIENCE = 10.0
 _DEAF_ALARMS = (1, 2)
 
 
@@ -116,10 +117,11 @@ class GrblSession:
         self.drain()
         limit_s = self._answer_timeout_s if timeout_s is None else timeout_s
         self._link.write(line.encode("ascii") + b"\n")
-        deadline_s = self._clock.monotonic_s() + limit_s
+        end_s = self._clock.monotonic_s() + _PATIENCE * limit_s
         restarts, lines = self.restarts, list[Line]()
         while True:
-            answer = self.pump(deadline_s - self._clock.monotonic_s())
+            # A board that still talks is not late: each line gives it time anew.
+            answer = self.pump(min(limit_s, end_s - self._clock.monotonic_s()))
             if answer is None:
                 self.in_step = False
                 raise StageTimeoutError(

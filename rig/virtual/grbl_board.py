@@ -31,7 +31,7 @@ RX_BYTES = 128
 _LINE_CHARS = 79
 _BYTE_S = 10.0 / 115200.0
 _TX_BYTES = 104
-_TICK_S = 0.002
+_TICK_S = 0.005
 _PASS_S = 2e-5
 _BANNER = "\r\nGrbl 1.1h ['$' for help]"
 _OVERRIDES = {
@@ -105,10 +105,10 @@ class GrblBoard:
         """Put bytes on the line to the host; garbage too, if a test wants it."""
         if self.now_s < self._mute_until_s:
             return
-        start_s = max(self.now_s + self.latency_s, self._tx_free_s)
+        start_s = max(self.now_s, self._tx_free_s)
         for piece in data.splitlines(keepends=True):
             start_s += len(piece) * _BYTE_S
-            self._out.append((start_s, piece))
+            self._out.append((start_s + self.latency_s, piece))
         self._tx_free_s = start_s
 
     def at(self, time_s: float, action: Callable[[], None]) -> None:

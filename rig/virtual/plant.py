@@ -63,8 +63,10 @@ class Plant:
         """Return the closed limit switches as bits (1: X, 2: Y, 4: Z)."""
         if self.stuck:
             return 7
-        return sum(
-            1 << axis
-            for axis, place in enumerate(self._carriage_mm)
-            if place >= self._high_mm or place <= self._low_mm
+        high, low = self._high_mm, self._low_mm
+        x, y, z = self._carriage_mm
+        return (
+            (1 if x >= high or x <= low else 0)
+            | (2 if y >= high or y <= low else 0)
+            | (4 if z >= high or z <= low else 0)
         )
