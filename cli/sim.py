@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from . import sim_magnet, sim_sweep
+from . import sim_equilibria, sim_magnet, sim_sweep
 from .console import group, print_json
 
 if TYPE_CHECKING:
@@ -19,6 +19,7 @@ app = group(
     "Predict shapes: rods, magnets, equilibria, sweeps.",
     "magbend sim shape --gmc 2 --field-mT 50 --angle-deg 90",
 )
+app.command("equilibria", epilog=sim_equilibria.EXAMPLE)(sim_equilibria.equilibria)
 app.command("magnet", epilog=sim_magnet.EXAMPLE)(sim_magnet.magnet)
 app.command("sweep", epilog=sim_sweep.EXAMPLE)(sim_sweep.sweep)
 
@@ -62,6 +63,9 @@ def shape(
     ] = 0.0,
     load_factor: Annotated[float, typer.Option(help="Factor on the magnetism.")] = 1.0,
     points: Annotated[int, typer.Option(min=61, help="Points of the shape.")] = 61,
+    verify: Annotated[
+        bool, typer.Option("--verify", help="Solve again by energy, and compare.")
+    ] = False,
     out: Annotated[Path | None, typer.Option(help="Write the shape as CSV.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
@@ -80,6 +84,8 @@ def shape(
         rod, field, support=support, model=model, poisson_ratio=poisson, points=points
     )
     data = _summary(rod, model, solution)
+    if verify and solution.centreline is not None:
+        data["check_mm"] = _check(rod, field, support, model, solution)
     if out is not None:
         _write(solution, rod, out)
     if as_json:
@@ -147,6 +153,16 @@ def _summary(rod: Specimen, model: str, solution: Solution) -> dict[str, Any]:
     return data
 
 
+def _check(
+    rod: Specimen, field: Field, support: Support, model: str, solution: Solution
+) -> float:
+    if model != "rod":
+        raise typer.BadParameter("--verify belongs to --model rod")
+    from ..sim.check import verify
+
+    return verify(rod, field, solution, support=support)
+
+
 def _columns(solution: Solution) -> dict[str, Any]:
     line = solution.centreline
     if line is None:
@@ -175,7 +191,11 @@ def _print(data: dict[str, Any]) -> None:
         typer.echo(f"  root moment  {data['root_moment_Nm']:.6g} N m")
         typer.echo(f"  Morse index  {data['morse_index']}")
         typer.echo(f"  error        below {data['error_mm']:.1e} mm")
-    else:
+    elif data["load_limit"] < 1.0:
         typer.echo(f"  branch ends  at {data['load_limit']:.4g} of the load")
+    else:
+        typer.echo("  touches the magnet at full load")
     bx, by = data["flux_tip_mT"]
     typer.echo(f"  flux at tip  ({bx + 0.0:.4f}, {by + 0.0:.4f}) mT")
+    if "check_mm" in data:
+        typer.echo(f"  check        least energy agrees to {data['check_mm']:.1e} mm")

@@ -30,14 +30,14 @@ TURN = 0.15
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fold:
-    """A load at which a pair of equilibria appears.
+    """A load at which a pair of equilibria begins (or, in graded rods, ends).
 
     Parameters
     ----------
     flux_mT : float
         Flux density.
     theta_tip_rad : float
-        Tip angle of the equilibrium that is born there.
+        Tip angle of the equilibrium in which the pair meets.
     kind : str
         ``fold``; or ``pitchfork``, where the pair leaves a rod that stays straight
         (field exactly along it).
@@ -158,11 +158,14 @@ def _trace(
     row = _at(rod, *here)
     path = [(v, 0.0, row[3])]
     folds: list[tuple[float, float, str]] = []
-    tangent = _tangent(row, np.array([0.0, -1.0]))
+    tangent = _tangent(row, np.array([0.0, -1.0]), 0.0)
+    # Along one curve the gradient of the root angle stays on one side. Close to a
+    # pitchfork, where curves nearly cross, a step onto another one shows by it.
+    side = 0.0 if _symmetric(rod) else float(np.sign(tangent @ (-row[2], row[1])))
     step = STEP
     for _ in range(20000):
         moved = _correct(rod, goal, here + step * tangent, tangent)
-        turned = None if moved is None else _tangent(moved[1], tangent)
+        turned = None if moved is None else _tangent(moved[1], tangent, side)
         if moved is None or turned is None or turned @ tangent < np.cos(TURN):
             step *= 0.5
             if step < 1e-9:
@@ -185,14 +188,24 @@ def _trace(
     )
 
 
-def _tangent(row: Array, before: Array) -> Array:
-    """Return the unit vector along the curve, continuing `before`."""
+def _symmetric(rod: PlanarRod) -> bool:
+    """Tell whether the field is exactly along the rod, so that curves do cross."""
+    return bool(rod.pull_rad == 0.0 or abs(rod.pull_rad - np.pi) < 1e-12)
+
+
+def _tangent(row: Array, before: Array, side: float) -> Array:
+    """Return the unit vector along the curve, continuing `before`.
+
+    `side` is the factor of the gradient's perpendicular, or 0 for either.
+    """
     tangent = np.array([-row[2], row[1]])
     size = float(np.hypot(*tangent))
     if size == 0.0:
         return before
     tangent /= size
-    return tangent if tangent @ before >= 0.0 else -tangent
+    if side == 0.0:
+        side = 1.0 if tangent @ before >= 0.0 else -1.0
+    return side * tangent
 
 
 def _correct(
@@ -234,12 +247,12 @@ def _land(
 def _fold(rod: PlanarRod, goal: float, guess: Array) -> tuple[float, float, str]:
     """Polish a fold: root angle at the clamp, and no derivative by the tip angle."""
     point, h = guess.copy(), 1e-4
+    straight = _symmetric(rod)
     for _ in range(40):
         v, mu = point
         row = _at(rod, v, mu)
         bend = (_at(rod, v + h, mu)[1] - _at(rod, v - h, mu)[1]) / (2.0 * h)
         push = (_at(rod, v, mu + h)[1] - _at(rod, v, mu - h)[1]) / (2.0 * h)
-        straight = np.sin(rod.pull_rad) == 0.0 or abs(rod.pull_rad - np.pi) < 1e-12
         if straight:  # by symmetry at v = 0, where the other equation is empty
             change = np.array([-v, -row[1] / push])
         else:

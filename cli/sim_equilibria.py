@@ -1,0 +1,154 @@
+"""``magbend sim equilibria``: every planar equilibrium in a uniform field."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .console import print_json
+
+if TYPE_CHECKING:
+    from ..core.specimen import Specimen
+    from ..sim.equilibria import Equilibrium
+    from ..sim.equilibria_folds import Branch, Fold
+
+EXAMPLE = (
+    "Example: magbend sim equilibria --gmc 2 --field-mT 500 --angle-deg 150 --fold"
+)
+
+
+def equilibria(
+    gmc: Annotated[
+        int | None, typer.Option(help="Rod of the paper's Table 1, 1 to 7.")
+    ] = None,
+    specimen: Annotated[Path | None, typer.Option(help="Specimen file (TOML).")] = None,
+    remeasured: Annotated[
+        bool, typer.Option("--remeasured", help="With --gmc: the sides as remeasured.")
+    ] = False,
+    field_mT: Annotated[
+        float, typer.Option("--field-mT", help="Uniform flux density in mT.")
+    ] = 50.0,
+    angle_deg: Annotated[
+        float, typer.Option(help="Direction of the field from +x, in deg.")
+    ] = 90.0,
+    clamp_angle_deg: Annotated[
+        float, typer.Option(help="Direction of the clamp from +x, in deg.")
+    ] = 0.0,
+    load_factor: Annotated[float, typer.Option(help="Factor on the magnetism.")] = 1.0,
+    fold: Annotated[
+        bool, typer.Option("--fold", help="Also the loads at which pairs appear.")
+    ] = False,
+    figure: Annotated[
+        Path | None, typer.Option(help="Draw shapes and branches: .svg, .pdf, .png.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Find every planar equilibrium of a weightless rod, stable or not."""
+    from ..sim.equilibria import find_equilibria
+    from ..sim.equilibria_folds import trace_branches
+    from ..sim.fields import Support, UniformField
+
+    rod = _specimen(gmc, specimen, remeasured)
+    field = UniformField(flux_mT=field_mT, angle_deg=angle_deg)
+    support = Support(clamp_angle_deg=clamp_angle_deg, load_factor=load_factor)
+    found = find_equilibria(rod, field, support=support)
+    branches: tuple[Branch, ...] = ()
+    if fold or figure is not None:
+        branches = trace_branches(rod, field, support=support)
+    if figure is not None:
+        from ..sim.equilibria_figure import draw_equilibria
+
+        title = f"{rod.name}, {field_mT:g} mT at {angle_deg:g} deg"
+        draw_equilibria(figure, found, branches, title=title)
+    folds = sorted(
+        (one for branch in branches for one in branch.folds),
+        key=lambda one: abs(one.flux_mT),
+    )
+    if as_json:
+        print_json(_data(rod, field_mT, angle_deg, found, folds if fold else None))
+        return
+    _print(rod, field_mT, angle_deg, found)
+    if fold:
+        _print_folds(folds, field_mT)
+    if figure is not None:
+        typer.echo(f"wrote {figure}")
+
+
+def _specimen(gmc: int | None, file: Path | None, remeasured: bool) -> Specimen:
+    if (gmc is None) == (file is None):
+        raise typer.BadParameter("give either --gmc 1..7 or --specimen FILE")
+    if gmc is not None:
+        from ..sim.table1 import gmc as table1
+
+        return table1(gmc, remeasured=remeasured)
+    if remeasured:
+        raise typer.BadParameter("--remeasured belongs to --gmc")
+    from ..core.specimen_file import read_specimen
+
+    return read_specimen(Path(str(file)))
+
+
+def _data(
+    rod: Specimen,
+    field_mT: float,
+    angle_deg: float,
+    found: tuple[Equilibrium, ...],
+    folds: list[Fold] | None,
+) -> dict[str, Any]:
+    data: dict[str, Any] = {
+        "specimen": rod.name,
+        "flux_mT": field_mT,
+        "angle_deg": angle_deg,
+        "count": len(found),
+        "equilibria": [
+            {
+                "theta_tip_rad": one.theta_tip_rad,
+                "tip_mm": one.tip_mm,
+                "morse_index": one.morse_index,
+                "status": one.status,
+                "root_moment_Nm": one.root_moment_Nm,
+            }
+            for one in found
+        ],
+    }
+    if folds is not None:
+        data["folds"] = [
+            {
+                "flux_mT": one.flux_mT,
+                "theta_tip_rad": one.theta_tip_rad,
+                "kind": one.kind,
+            }
+            for one in folds
+        ]
+    return data
+
+
+def _print(
+    rod: Specimen, field_mT: float, angle_deg: float, found: tuple[Equilibrium, ...]
+) -> None:
+    count = "1 equilibrium" if len(found) == 1 else f"{len(found)} equilibria"
+    typer.echo(f"{rod.name}, {field_mT:g} mT at {angle_deg:g} deg: {count}")
+    typer.echo("  tip angle deg       tip x mm     tip y mm  Morse index")
+    for one in found:
+        x, y = one.tip_mm
+        typer.echo(
+            f"  {one.theta_tip_rad * 57.29577951308232:13.5f}  {x:13.5f}{y:13.5f}"
+            f"  {one.morse_index} ({one.status})"
+        )
+
+
+def _print_folds(folds: list[Fold], field_mT: float) -> None:
+    if not folds:
+        typer.echo(f"  no fold up to {field_mT:g} mT")
+    for one in folds:
+        what = (
+            "a pair begins or ends"
+            if one.kind == "fold"
+            else "a pair leaves the straight rod"
+        )
+        typer.echo(
+            f"  {one.kind} at {one.flux_mT:.8g} mT, tip angle "
+            f"{one.theta_tip_rad * 57.29577951308232:.5f} deg: {what}"
+        )
