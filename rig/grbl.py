@@ -126,6 +126,7 @@ class GrblStage:
         try:
             found = connect_board(session, self._clock, config)
             problem = grbl_audit.audit(found.settings, config)
+            problem = problem or grbl_audit.audit_build(found.details, config)
             if problem:
                 raise StageError(f"the stage on {port} does not fit: {problem}")
         except BaseException:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from .stage import StageLimits
 from .stage_config import StageConfig
@@ -48,6 +48,20 @@ def audit(settings: Settings, config: StageConfig) -> str | None:
                 f"${name}={wanted:g} on the board's console, or correct the rig file"
             )
     return _audit_flags(settings, config)
+
+
+def audit_build(details: Sequence[str], config: StageConfig) -> str | None:
+    """Return why the firmware's build cannot do what the rig file asks, or None.
+
+    A stock GRBL that receives ``$HX`` answers ``error:3`` and stays stuck in Home.
+    """
+    options = next((d for d in details if d.startswith("OPT:")), "OPT:")
+    if config.home_command != "$H" and "H" not in options[4:].split(",")[0]:
+        return (
+            f"stage.home_command is {config.home_command}, but [{options}] says that "
+            "this build has no single-axis homing; use $H, or a build that has it"
+        )
+    return None
 
 
 def _expected(config: StageConfig) -> list[tuple[str, str, float | None]]:

@@ -11,7 +11,7 @@ from .grbl_session import CommandRefusedError, GrblSession
 from .stage import StageError, StageTimeoutError
 from .stage_config import StageConfig
 
-_MOVING_STATES = ("run", "jog", "home")
+_MOVING_STATES = ("run", "jog")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,6 +89,8 @@ def _first_report(
 
 
 def _moving(report: Report) -> bool:
+    # Home is not among them: a running cycle answers nothing, and a board that is
+    # stuck in Home needs a reset; a feed hold would hide that its position is lost.
     return report.state in _MOVING_STATES or (
         report.state == "hold" and report.substate != 0
     )
@@ -105,8 +107,6 @@ def _wait_for_stand(
         report = session.ask()
         if report is None or not _moving(report):
             return report
-        if report.state == "home":
-            return report  # stuck in Home, or deaf in a cycle: only a reset helps
         clock.sleep(0.1)
     return report
 

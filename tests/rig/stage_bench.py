@@ -59,6 +59,7 @@ def interrupt() -> None:
 
 def make_bench(
     settings: dict[int, float] | None = None,
+    /,
     *,
     log: WireLog | None = None,
     plant: Plant | None = None,
