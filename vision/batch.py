@@ -7,6 +7,7 @@ import json
 import logging
 import math
 import multiprocessing
+import signal
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -262,6 +263,8 @@ def _start_worker(task: _Task) -> None:
     global _task
     _task = task
     cv2.setNumThreads(1)
+    # Ctrl-C reaches every process of the terminal; the parent alone answers it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _work(source: Source) -> _Done:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import cv2
@@ -372,6 +373,22 @@ def test_two_processes_give_the_same_tables(tmp_path, folder):
         assert one == two
     state = json.loads((tmp_path / "two" / "extract.json").read_text())
     assert set(state["images"]) == {"a.png", "b.png", "c.png"}
+
+
+def test_a_dying_worker_does_not_lose_the_batch(tmp_path, folder, monkeypatch):
+    class Dying:
+        def __init__(self, *_args, **_options):
+            pass
+
+        def map(self, work, todo, chunksize):
+            raise BrokenProcessPool("a worker was killed")
+
+        def shutdown(self, **_options):
+            pass
+
+    monkeypatch.setattr("magbend.vision.batch.ProcessPoolExecutor", Dying)
+    result = extract_files([folder], tmp_path / "out", settings=SETTINGS, workers=2)
+    assert [row.status for row in result.frames] == ["failed", "ok", "ok"]
 
 
 def test_overlay_of_a_large_photograph_is_made_smaller(tmp_path, good):
