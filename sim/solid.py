@@ -252,7 +252,7 @@ def _start(
     flux = field_array(field, specimen.length_mm)
     margin = 0.5 * float(rod[:, SIDE].max())
     clamp = rad_from_deg(support.clamp_angle_deg)
-    outcome, _, load, _, bx, by, _, _, tip = solve_planar(
+    outcome, _, load, _, bx, by, moment, _, tip = solve_planar(
         rod_array(specimen, support),
         flux,
         clamp,
@@ -273,9 +273,11 @@ def _start(
             f"the load P L^2 / EI must be below {LOAD_LIMIT:g} for the solid model; "
             f"instead received {highest:.3g}: use the plain rod"
         )
+    base = np.array([base[0], base[1], load])
     if outcome == GONE:
         tip[0] = np.nan
-    base = np.array([base[0], base[1], load])
+    else:
+        _refuse_strain(rod, base, float(rod[-1, E]) * moment)
     return tip, base, (mT_from_T(bx), mT_from_T(by))
 
 
