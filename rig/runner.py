@@ -233,9 +233,10 @@ class _Session:
             and abs(status.stage_mm - move.stage_mm) <= slack_mm
         )
         if not stands:
+            alarm = f" (ALARM:{status.alarm})" if status.alarm else ""
             raise StageError(
                 f"the stage must stand at {move.stage_mm:.3f} mm while it is "
-                f"photographed; instead it reports {status.state}, position "
+                f"photographed; instead it reports {status.state}{alarm}, position "
                 f"{status.position_state}, {status.stage_mm} mm; the step was not "
                 f"recorded: look at the stage, then go on with --resume"
             )

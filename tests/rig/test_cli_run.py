@@ -1,0 +1,125 @@
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from magbend.cli.main import app
+
+# A plan of one gap, quickly settled: the twin's photographs take their time.
+QUICK = "gaps_mm = [70.0]"
+
+
+def magbend(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "magbend.cli.main", *words]
+    return subprocess.run(
+        command, cwd=cwd, capture_output=True, text=True, check=False, timeout=120
+    )
+
+
+@pytest.fixture(scope="module")
+def bench_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of `rig init --twin` with one finished run of one step in it."""
+    folder = tmp_path_factory.mktemp("bench")
+    assert (
+        CliRunner().invoke(app, ["rig", "init", str(folder), "--twin"]).exit_code == 0
+    )
+    plan = folder / "plan.toml"
+    plan.write_text(plan.read_text().replace("gaps_mm = [70.0, 60.0, 50.0]", QUICK))
+    done = magbend("rig", "run", "plan.toml", "--out", "run", "--json", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    summary = json.loads(done.stdout)
+    assert (summary["status"], summary["steps_done"]) == ("success", 1)
+    return folder
+
+
+def test_run_and_verify(bench_folder: Path) -> None:
+    done = magbend("rig", "verify", "run", cwd=bench_folder)
+    assert done.returncode == 0
+    assert "good, 1 steps, success" in done.stdout
+    wire = (bench_folder / "run" / "wire.log").read_text()
+    assert "$H" in wire
+    manifest = json.loads((bench_folder / "run" / "run.json").read_text())
+    assert manifest["twin"] is True
+
+
+def test_verify_fails_on_an_altered_picture(bench_folder: Path, tmp_path: Path) -> None:
+    import shutil
+
+    copy = tmp_path / "copy"
+    shutil.copytree(bench_folder / "run", copy)
+    (copy / "images" / "step_000.png").write_bytes(b"x")
+    result = CliRunner().invoke(app, ["rig", "verify", str(copy), "--json"])
+    assert result.exit_code == 1
+    assert "step_000.png: altered" in json.loads(result.stdout)["problems"][0]
+
+
+def test_a_run_is_not_overwritten(bench_folder: Path) -> None:
+    done = magbend("rig", "run", "plan.toml", "--out", "run", cwd=bench_folder)
+    assert done.returncode == 1
+    assert "holds a run already" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_the_dry_run_moves_nothing_and_predicts(bench_folder: Path) -> None:
+    plan = str(bench_folder / "plan.toml")
+    result = CliRunner().invoke(app, ["rig", "run", plan, "--dry-run", "--json"])
+    assert result.exit_code == 0
+    (step,) = json.loads(result.stdout)["steps"]
+    assert step["stage_mm"] == -80.0
+    # The paper's Eq. 1-4 for 1.305 T at 70 mm.
+    assert step["predicted_flux_mT"] == pytest.approx(36.52, abs=0.01)
+    text = CliRunner().invoke(app, ["rig", "run", plan, "--dry-run"]).stdout
+    assert "nothing was moved" in text
+    assert not (bench_folder / "runs").exists()
+
+
+def test_scan_field_fits_the_magnet(bench_folder: Path) -> None:
+    done = magbend(
+        "rig", "scan-field", "plan.toml", "--out", "scan", "--gaps-mm", "90,70,50",
+        "--json", cwd=bench_folder,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    data = json.loads(done.stdout)
+    assert data["readings"] == 3
+    assert data["magnet"]["remanence_T"] == pytest.approx(1.305, rel=0.06)
+    assert (bench_folder / "scan" / "field.svg").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "sentence"),
+    [
+        (["rig", "run", "no.toml"], 1, "no.toml: there is no such file"),
+        (["rig", "run", "plan.toml", "--resume"], 1, "--resume needs --out"),
+        (["rig", "run", "plan.toml", "--out", "x", "--flux-mT", "1,2"], 1, "one read"),
+        (["rig", "run", "plan.toml", "--out", "x", "--flux-mT", "a"], 1, "numbers"),
+        (["rig", "verify", "nowhere"], 1, "no such run folder"),
+        (["rig", "verify"], 2, "Missing argument"),
+        (["rig", "run", "plan.toml", "--speed"], 2, "No such option"),
+        (["rig", "init", "."], 1, "is not overwritten"),
+        (["rig", "run", "plan.toml", "--out", "plan.toml/x"], 1, "plan.toml"),
+    ],
+)
+def test_mistakes_end_in_one_sentence(bench_folder, words, code, sentence) -> None:
+    done = magbend(*words, cwd=bench_folder)
+    assert done.returncode == code
+    assert sentence in done.stderr + done.stdout
+    assert "Traceback" not in done.stderr
+
+
+def test_help_imports_nothing_heavy() -> None:
+    script = (
+        "import sys\nfrom magbend.cli.main import app\n"
+        "try:\n    app(['rig', '--help'])\nexcept SystemExit:\n    pass\n"
+        "heavy = {'numpy', 'cv2', 'serial', 'pydantic', 'rich', 'scipy', 'numba'}\n"
+        "sys.exit(str(heavy & set(sys.modules)) if heavy & set(sys.modules) else 0)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Example: magbend rig run" in done.stdout
