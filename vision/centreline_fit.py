@@ -4,9 +4,10 @@ The curve is p(s) = p0 + integral of (cos theta, sin theta), so its parameter is
 length without any later correction. Measured points pull along the normal only. Knots
 are dense (about one a rod width); what keeps the fit smooth is a penalty on
 theta''' (a curvature that changes evenly, as at the root, is left alone), whose weight
-is the most likely one (restricted maximum likelihood, Wood 2011). Joints of known place get triple knots: theta stays continuous there and the curvature may
-jump. The covariance is the Bayesian one of Wahba (1983), which covers the bias of
-smoothing on average, widened by the correlation seen in the residuals.
+is the most likely one (restricted maximum likelihood, Wood 2011). Joints of known place
+get triple knots: theta stays continuous there and the curvature may jump. The
+covariance is the Bayesian one of Wahba (1983), which covers the bias of smoothing on
+average, widened by the correlation seen in the residuals.
 
 Units here are pixels and radians of the picture (y down).
 """
@@ -24,9 +25,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _DEGREE = 3
-_SHARED = 3.0
-"""Stations 1 px apart that carry one station's worth of information: bilinear samples
-and compressed pictures make neighbours alike."""
+_SHARED = 8.0
+"""Stations 1 px apart that carry one station's worth of information: bilinear samples,
+compressed pictures and shade on the paper make neighbours alike."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

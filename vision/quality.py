@@ -10,9 +10,12 @@ from .measurement import Measurement
 from .photo import Photo
 from .refine import LostError, Refined
 from .rod import Candidate
-from .specimen_frame import Setting
+from .specimen_frame import Setting, root_hidden
 
 LENGTH_TOLERANCE = 0.02
+
+SHADE_PX = 0.04
+"""Pull of a shade on the midline, before correction, above which it is named."""
 
 
 def refusal(photo: Photo, refined: Refined, candidate: Candidate) -> None:
@@ -57,9 +60,11 @@ def doubts(
         flags.append("clamp_at_border")
     if candidate.root == "free":
         flags.append("no_clamp")
+    if root_hidden(refined, setting):
+        flags.append("root_hidden")
     if photo.clipped > 0.01:
         flags.append("overexposed")
-    if _shadow(refined) > 0.02:
+    if float(np.quantile(refined.shaded[refined.good], 0.9)) > SHADE_PX:
         flags.append("shadow")
     if refined.good.mean() < 0.8 or refined.fit.noise > 0.02 * result.width_px:
         flags.append("rough_edges")
@@ -70,11 +75,3 @@ def doubts(
     if nominal is not None and abs(length / nominal - 1.0) > LENGTH_TOLERANCE:
         flags.append("length_mismatch")
     return replace(result, flags=tuple(flags))
-
-
-def _shadow(refined: Refined) -> float:
-    """Return how much the paper's level rises per px beside the edges, relative."""
-    edges = refined.edges
-    good = refined.good
-    shade = np.abs(edges.shade_low - edges.shade_high)[good]
-    return float(np.nanquantile(shade, 0.9)) / max(refined.contrast, 1e-6)

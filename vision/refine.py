@@ -20,7 +20,7 @@ Image = NDArray[np.float32]
 
 _PASSES = 4
 
-ROOT_CLEAR = 0.5
+ROOT_CLEAR = 0.3
 """Widths next to the clamp that are left out of the fit."""
 
 
@@ -49,6 +49,8 @@ class Refined:
         The axis from where the clamp line was taken (s = 0) to the tip's face.
     edges : Edges
         Side edges at the stations of the fit.
+    shaded : ndarray, shape (n,)
+        By how much shade on the paper would have moved the midline, uncorrected, px.
     good : ndarray of bool, shape (n,)
         Stations whose edges were used.
     width : ndarray, shape (n,)
@@ -65,6 +67,7 @@ class Refined:
 
     fit: CurveFit
     edges: Edges
+    shaded: Array
     good: NDArray[np.bool_]
     width: Array
     sigma_width: Array
@@ -157,7 +160,8 @@ def _pass(
     state.low, state.high = -0.5 * smooth, 0.5 * smooth
     kept = _at_stations(edges, curve.s, at)
     return Refined(
-        fit=fit, edges=kept, good=used, width=smooth, sigma_width=sigma, tip=shift,
+        fit=fit, edges=kept, shaded=_shaded(kept, state.blur), good=used,
+        width=smooth, sigma_width=sigma, tip=shift,
         clamp=None if lines is None else _shifted(lines, first),
         blur=state.blur, contrast=edges.contrast,
     )  # fmt: skip
@@ -269,7 +273,10 @@ def _fit(
         [-np.sin(theta), np.cos(theta)]
     )
     weights = used.astype(np.float64)
-    options = {"spacing": max(width, (last - first) / 60.0), "joints": joints(curve)}
+    options = {
+        "spacing": max(1.5 * width, (last - first) / 50.0),
+        "joints": joints(curve),
+    }
     fit = fit_curve(s - first, measured, weights, theta=theta, **options)  # type: ignore[arg-type]
     if turn >= 1:
         outlying = np.abs(np.nan_to_num(fit.residual)) > 4.0 * fit.noise + 1e-3
@@ -302,6 +309,15 @@ def _at_stations(edges: Edges, s: Array, at: Array) -> Edges:
     for name in Edges.__slots__:
         values[name] = np.interp(at, s, getattr(edges, name), left=np.nan, right=np.nan)
     return Edges(**values)
+
+
+def _shaded(edges: Edges, blur: float) -> Array:
+    """Half the difference of what the paper's slope does to either edge."""
+    reach = 1.5 * max(1.5, 2.2 * blur)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        low = edges.shade_low / edges.slope_low
+        high = edges.shade_high / edges.slope_high
+    return np.nan_to_num(0.25 * reach * np.abs(high - low))
 
 
 def _shifted(lines: ClampLines, first: float) -> ClampLines:

@@ -24,6 +24,15 @@ from .rod import Candidate
 
 Array = NDArray[np.float64]
 
+SPREAD = 1.1
+"""Factor on the fit's own deviations for what its residuals cannot show, and the
+systematic parts that the synthetic frames have: of sampling in pixels, and the share of
+a shade's pull that is left after the correction. A side face that is seen has another
+grey value than the top: `SIDE_FACE` of its width is in doubt."""
+SAMPLING_PX = 0.002
+SHADE_LEFT = 0.22
+SIDE_FACE = 0.07
+
 POINTS = 121
 """Points of a measured centreline."""
 
@@ -105,14 +114,15 @@ def _pixel_columns(
 ) -> dict[str, Array]:
     fit = refined.fit
     grid = fit.curve.s
+    systematic = SAMPLING_PX + SHADE_LEFT * refined.shaded
     width = np.interp(s, grid, refined.width)
     right = np.column_stack([-np.sin(theta), np.cos(theta)]) * 0.5 * width[:, None]
     return {
         "x_px": points[:, 0],
         "y_px": points[:, 1],
         "width_px": width,
-        "sigma_px": np.interp(s, grid, fit.sigma),
-        "sigma_theta_rad": np.interp(s, grid, fit.sigma_theta),
+        "sigma_px": np.interp(s, grid, np.hypot(SPREAD * fit.sigma, systematic)),
+        "sigma_theta_rad": SPREAD * np.interp(s, grid, fit.sigma_theta),
         "left_x_px": points[:, 0] - right[:, 0],
         "left_y_px": points[:, 1] - right[:, 1],
         "right_x_px": points[:, 0] + right[:, 0],
@@ -173,7 +183,9 @@ def _in_frame(
     pixel, angle = grid.at(s_px)
     table = _pixel_columns(refined, s_px, pixel, angle)
     scale = np.interp(even, s_mm, stretch)
-    across = _across(camera, pixel, angle, height)
+    across, rise = _across(camera, pixel, angle, height)
+    side = SIDE_FACE * np.abs(rise) * table["width_px"] / across
+    table["sigma_px"] = np.hypot(table["sigma_px"], side)
     table |= {
         "s_mm": even,
         "x_mm": np.interp(even, s_mm, local[:, 0]),
@@ -211,10 +223,7 @@ def _root(refined: Refined, local: _Local, setting: Setting, side_mm: float) -> 
     rise = local.rise_along
     face, front = refined.clamp.face, refined.clamp.front
     if rise > 0.0:
-        line = face or front
-        seen = 0.0 if line is None else line.s
-        top = setting.clamp_height_mm
-        return seen if top is None else seen - rise * (top - setting.rod_height_mm)
+        return _hidden_root(refined, local, setting)
     seen_at = []
     if face is not None:
         seen_at.append(face.s - 0.5 * rise * side_mm)
@@ -223,6 +232,30 @@ def _root(refined: Refined, local: _Local, setting: Setting, side_mm: float) -> 
     if len(seen_at) == 2 and abs(seen_at[1] - seen_at[0]) > 2.0:
         return seen_at[0]
     return float(np.mean(seen_at)) if seen_at else 0.0
+
+
+def _hidden_root(refined: Refined, local: _Local, setting: Setting) -> float:
+    """Return the root where the clamp's top edge hides it: by height, or by length."""
+    lines = refined.clamp
+    line = None if lines is None else lines.face or lines.front
+    seen = 0.0 if line is None else line.s
+    if setting.clamp_height_mm is not None:
+        return seen - local.rise_along * (
+            setting.clamp_height_mm - setting.rod_height_mm
+        )
+    if setting.length_mm is None:
+        return seen
+    missing = setting.length_mm * local.along - (refined.tip.s - seen)
+    return seen - float(np.clip(missing, 0.0, 10.0 * local.rise_along))
+
+
+def root_hidden(refined: Refined, setting: Setting) -> bool:
+    """Whether the clamp hides the root by more than a third of a pixel per mm."""
+    camera = setting.calibration
+    if camera is None or refined.clamp is None:
+        return False
+    at = _local(camera, refined.fit.curve, 0, setting.rod_height_mm)
+    return at.rise_along > 1.0 / 3.0
 
 
 def _local(camera: Calibration, curve: Curve, index: int, height: float) -> _Local:
@@ -240,8 +273,10 @@ def _local(camera: Calibration, curve: Curve, index: int, height: float) -> _Loc
     return _Local(along, across, float(rise @ t), float(rise @ n))
 
 
-def _across(camera: Calibration, points: Array, theta: Array, height: float) -> Array:
-    """Pixels of silhouette per mm of side, at points of the rod, shape (n,)."""
+def _across(
+    camera: Calibration, points: Array, theta: Array, height: float
+) -> tuple[Array, Array]:
+    """Pixels of silhouette per mm of side, and of side face per mm, shape (n,) each."""
     normal = np.column_stack([-np.sin(theta), np.cos(theta)])
     span = camera.to_mm(points + normal, height_mm=height) - camera.to_mm(
         points - normal, height_mm=height
@@ -250,7 +285,8 @@ def _across(camera: Calibration, points: Array, theta: Array, height: float) -> 
     rise = camera.to_px(at, height_mm=height + 0.5) - camera.to_px(
         at, height_mm=height - 0.5
     )
-    return 2.0 / np.hypot(*span.T) + np.abs(np.sum(rise * normal, axis=1))
+    across = np.sum(rise * normal, axis=1)
+    return 2.0 / np.hypot(*span.T) + np.abs(across), across
 
 
 def _arc(points: Array) -> Array:

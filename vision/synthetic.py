@@ -229,7 +229,18 @@ def draw(
     # In the picture y runs down: the left of the rod is at (-sin, -cos).
     normals = np.column_stack([-np.sin(heading), -np.cos(heading)])
     width_px = side_mm * px_per_mm
-    rod = coverage(strip(points, normals, width_px / 2.0), width, height)
+    # The rod goes on inside the clamp: else paper shines through where they meet.
+    held = points[0] - width_px * np.array([np.cos(heading[0]), -np.sin(heading[0])])
+    outline = strip(
+        np.vstack([held[None], points]),
+        np.vstack([normals[:1], normals]),
+        width_px / 2.0,
+    )
+    rod = coverage(
+        outline if clamp_height_mm > 0.0 else strip(points, normals, width_px / 2.0),
+        width,
+        height,
+    )
     block = _clamp_block(points[0], heading[0], clamp_height_mm * px_per_mm, size_px)
     linear = _expose(rod, block, light, px_per_mm, rng)
     return Frame(
