@@ -27,6 +27,9 @@ from .fields import STABLE, UNSTABLE, Support, UniformField
 
 Array = NDArray[np.float64]
 
+STRAIGHT = 1e-14
+"""A pull nearer to the clamp's tangent than this, in rad, counts as along it."""
+
 LOAD_LIMIT = 1e5
 """Largest m B L^2 / EI: beyond it tips differ from the field by less than 1e-137."""
 
@@ -112,10 +115,13 @@ def planar_rod(specimen: Specimen, field: UniformField, support: Support) -> Pla
     turned = np.pi if moment[0] < 0.0 else 0.0
     if turned:
         moment = -moment
-    pull = np.radians(field.angle_deg - support.clamp_angle_deg) + turned
+    pull = float(np.radians(field.angle_deg - support.clamp_angle_deg) + turned)
+    pull -= 2.0 * np.pi * np.floor(pull / (2.0 * np.pi))
+    if min(pull, 2.0 * np.pi - pull) < STRAIGHT:
+        pull = 0.0
     rod = PlanarRod(
         lengths=lengths, stiffness=EI / unit, moment=moment,
-        pull_rad=float(np.mod(pull, 2.0 * np.pi)),
+        pull_rad=pull,
         clamp_rad=float(np.radians(support.clamp_angle_deg)),
         length_mm=specimen.length_mm, stiffness_Nm2=unit,
     )  # fmt: skip
@@ -242,8 +248,9 @@ def tip_angle_rad(rod: PlanarRod, v: float, turn: int) -> float:
 def _grid(rod: PlanarRod, load: float) -> Array:
     """Scan points: dense enough for every swing, reaching beyond every tip angle."""
     swings = rod.size * load**0.5
-    end = 0.5 * swings + 8.0
-    half = np.linspace(0.0, end, int(60 + 30 * swings))
+    near = min(rod.pull_rad, 2.0 * np.pi - rod.pull_rad) if rod.pull_rad else 1.0
+    end = 0.5 * (swings - np.log(min(near, 1.0))) + 8.0
+    half = np.linspace(0.0, end, int(60 + 30 * swings + 4 * end))
     return np.concatenate([-half[:0:-1], half])
 
 

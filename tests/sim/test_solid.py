@@ -164,5 +164,9 @@ def test_out_of_the_model_is_refused() -> None:
     )  # fmt: skip
     with pytest.raises(InputError, match="strain"):
         solve_solid(thick, UniformField(flux_mT=300.0))
+    thread = Specimen(
+        name="thread", side_mm=0.1, remanence_mT=20.0,
+        sections=(Section(length_mm=100.0, E_MPa=1.0),),
+    )  # fmt: skip
     with pytest.raises(InputError, match="load"):
-        solve_solid(gmc(2), UniformField(flux_mT=20000.0))
+        solve_solid(thread, UniformField(flux_mT=50.0, angle_deg=20.0))
