@@ -92,6 +92,7 @@ class Link:
         self._serial: Any = None
         self._owner = 0
         self._buffer = bytearray()
+        self._unlogged = bytearray()
 
     @property
     def is_open(self) -> bool:
@@ -124,6 +125,7 @@ class Link:
         self._serial = port
         self._owner = threading.get_ident()
         self._buffer.clear()
+        self._unlogged.clear()
         self._remark(f"opened {self.port} at {self._baud}")
 
     def write(self, data: bytes) -> None:
@@ -186,12 +188,14 @@ class Link:
         """Close the port; never raises."""
         port, self._serial = self._serial, None
         if port is not None:
+            self._log_received(whole=False)
             with contextlib.suppress(OSError):
                 port.close()
             self._remark(f"closed {self.port}")
 
     def _send(self, data: bytes) -> None:
         port = self._require_open()
+        self._log_received(whole=False)
         if self._log:
             self._log.record(self._device, ">>", data)
         try:
@@ -202,14 +206,24 @@ class Link:
     def _receive(self) -> bool:
         port = self._require_open()
         try:
-            data = port.read(max(1, port.in_waiting))
+            data = port.read(1)
+            if data:
+                data += port.read(port.in_waiting)
         except (OSError, TypeError) as error:  # TypeError: closed in the middle
             raise self._lost(error) from None
-        if data and self._log:
-            for piece in data.splitlines(keepends=True):
-                self._log.record(self._device, "<<", piece)
         self._buffer += data
+        self._unlogged += data
+        self._log_received(whole=True)
         return bool(data)
+
+    def _log_received(self, *, whole: bool) -> None:
+        """Record what came in, whole lines only or all of it."""
+        end = self._unlogged.rfind(b"\n") + 1 if whole else len(self._unlogged)
+        pieces = bytes(self._unlogged[:end]).splitlines(keepends=True)
+        del self._unlogged[:end]
+        for piece in pieces:
+            if self._log:
+                self._log.record(self._device, "<<", piece)
 
     def _waiting(self) -> bool:
         try:

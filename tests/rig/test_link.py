@@ -1,0 +1,161 @@
+"""The serial link: whole lines, one owner, a lost device, every byte on record."""
+
+from __future__ import annotations
+
+import os
+import threading
+
+import pytest
+
+from magbend.core.errors import StageError
+from magbend.rig.clock import ScaledClock, SteppedClock, SystemClock
+from magbend.rig.link import Link, WireLog
+from magbend.rig.ports import resolve_port
+from magbend.rig.presence import Presence
+from magbend.rig.stage import LinkLostError
+from magbend.rig.virtual.grbl_board import GrblBoard
+from magbend.rig.virtual.protocol_twin import register_board
+from magbend.rig.virtual.pty_server import PtyBoard
+
+posix = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
+
+
+@pytest.fixture(autouse=True)
+def runtime_folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("MAGBEND_RUNTIME_DIR", str(tmp_path))
+
+
+@pytest.fixture
+def twin():
+    clock, board = SteppedClock(), GrblBoard()
+    link = Link(register_board("link", board, clock), baud=115200, clock=clock)
+    link.open()
+    while link.read_line(0.2):
+        pass
+    yield board, link, clock
+    link.close()
+
+
+def test_a_line_in_pieces_is_one_line(twin):
+    board, link, _ = twin
+    board.send(b"<Idle|MP")
+    assert link.read_line(0.1) is None
+    board.send(b"os:0,0,0>\r\nok\r")
+    assert link.read_line(0.1) == "<Idle|MPos:0,0,0>"
+    assert link.read_line(0.1) is None
+    board.send(b"\n")
+    assert link.read_line(0.1) == "ok"
+
+
+def test_bytes_of_no_text_do_not_break_a_line(twin):
+    board, link, _ = twin
+    board.send(b"\xff\x00\xfe\r\nok\r\n")
+    assert link.read_line(0.1)
+    assert link.read_line(0.1) == "ok"
+
+
+def test_an_endless_line_does_not_fill_the_memory(twin):
+    board, link, _ = twin
+    board.send(b"x" * 20_000)
+    assert link.read_line(3.0) is None
+    board.send(b"\r\nok\r\n")
+    lines = [link.read_line(0.2), link.read_line(0.2)]
+    assert "ok" in lines
+
+
+def test_waiting_takes_the_time_of_the_clock(twin):
+    _, link, clock = twin
+    before_s = clock.monotonic_s()
+    assert link.read_line(7.0) is None
+    assert clock.monotonic_s() - before_s == pytest.approx(7.0, abs=0.05)
+
+
+def test_a_device_that_vanishes_is_a_lost_link_on_read_and_write(twin):
+    board, link, _ = twin
+    board.plugged = False
+    with pytest.raises(LinkLostError, match="link lost"):
+        link.read_line(0.1)
+    with pytest.raises(LinkLostError):
+        link.write(b"$$\n")
+    assert not link.is_open
+
+
+def test_only_the_owner_speaks_lines_but_anybody_may_stop(twin):
+    _, link, _ = twin
+    errors = []
+
+    def other():
+        link.write_realtime(b"!")
+        try:
+            link.write(b"$$\n")
+        except StageError as error:
+            errors.append(str(error))
+
+    thread = threading.Thread(target=other)
+    thread.start()
+    thread.join()
+    assert "belongs to the thread" in errors[0]
+
+
+def test_the_log_holds_every_byte_both_ways(twin, tmp_path):
+    board, _, clock = twin
+    board.port_taken = False
+    log = WireLog(tmp_path / "wire.log", clock)
+    link = Link("twin://link", baud=115200, clock=clock, log=log, device="stage")
+    link.open()
+    link.write(b"$I\n")
+    assert link.read_line(1.0) == "[VER:1.1h.20190830:]"
+    link.close()
+    log.close()
+    log.record("stage", ">>", b"late")  # a closed log stops nobody
+    text = (tmp_path / "wire.log").read_text()
+    assert "stage >> b'$I\\n'" in text
+    assert "stage << b'[VER:1.1h.20190830:]\\r\\n'" in text
+    assert text.count(" -- ") == 2
+
+
+@posix
+def test_the_same_code_talks_through_a_pseudo_terminal():
+    clock = SystemClock()
+    with PtyBoard(GrblBoard(), ScaledClock(10.0)) as served:
+        link = Link(served.port, baud=115200, clock=clock)
+        link.open()
+        link.write(b"\x18")
+        lines = [link.read_line(2.0)]
+        link.write(b"$I\n")
+        lines += [link.read_line(2.0), link.read_line(2.0), link.read_line(2.0)]
+        second = Link(served.port, baud=115200, clock=clock)
+        with pytest.raises(StageError, match="in use"):
+            second.open()
+        served.unplug()
+        with pytest.raises(LinkLostError):
+            [link.read_line(1.0) for _ in range(9)]
+        with pytest.raises(LinkLostError):
+            link.write(b"?")
+    assert "[VER:1.1h.20190830:]" in lines
+
+
+def test_a_stop_request_reaches_the_owner_and_dies_with_the_claim():
+    owner, outside = Presence("/dev/ttyTEST"), Presence("/dev/ttyTEST")
+    assert outside.owner() is None
+    owner.claim()
+    assert outside.owner() == os.getpid()
+    outside.ask_to_stop()
+    assert owner.stop_asked()
+    owner.release()
+    assert not outside.stop_asked()
+    assert outside.owner() is None
+
+
+def test_a_remembered_place_is_told_once():
+    presence = Presence("/dev/ttyTEST")
+    presence.remember((-1.0, -2.0, -3.0))
+    assert presence.recall() == (-1.0, -2.0, -3.0)
+    assert presence.recall() is None
+
+
+def test_ports_are_named_as_they_are_or_by_what_is_plugged_in():
+    assert resolve_port("/dev/ttyACM0") == "/dev/ttyACM0"
+    assert resolve_port("twin://x") == "twin://x"
+    with pytest.raises(StageError, match="no port with serial:NOSUCH"):
+        resolve_port("serial:NOSUCH")
