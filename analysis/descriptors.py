@@ -25,7 +25,6 @@ COLUMNS: Final = (
 """Descriptors, in the order of the columns of `describe`."""
 
 _FLAT = 1e-9
-_NOTHING = np.empty(0)
 
 
 def describe(shapes: Array) -> Array:
@@ -44,12 +43,12 @@ def describe(shapes: Array) -> Array:
     """
     out = np.empty((len(shapes), len(COLUMNS)))
     shapes = np.ascontiguousarray(shapes, dtype=np.float64)
-    in_threads(_describe, _NOTHING, shapes, out)
+    in_threads(_describe, shapes, out)
     return out
 
 
 @njit(cache=True, nogil=True)
-def _describe(_nothing, shapes, out):  # type: ignore[no-untyped-def]
+def _describe(shapes, out):  # type: ignore[no-untyped-def]
     for i in range(shapes.shape[0]):
         shape = shapes[i]
         last = shape.shape[0] - 1

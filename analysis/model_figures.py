@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from .design import Design
     from .expansion_train import TrainingReport
     from .goals import Goal
+    from .sobol import Sensitivity
 
 SUFFIXES = (".svg", ".pdf", ".png")
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -106,7 +107,33 @@ def design_figure(designs: list[Design], goal: Goal) -> Any:
         axes.plot(*goal.wanted, "k+", ms=10, label="wanted")
     if goal.curve_mm is not None:
         axes.plot(*goal.curve_mm.T, "k--", lw=1, label="wanted")
-    axes.set(xlabel="x (mm)", ylabel="y (mm)", aspect="equal")
+    axes.set(xlabel="x (mm)", ylabel="y (mm)")
+    axes.set_aspect("equal", adjustable="datalim")
     axes.set_title(f"{goal.words}; bands: 95 % of what fabrication makes", fontsize=9)
     axes.legend(fontsize=7, frameon=False)
+    return figure
+
+
+def sobol_figure(found: Sensitivity) -> Any:
+    """Draw total and first-order indices: one panel an output, one bar a field."""
+    from .sobol import OUTPUTS, PARAMETERS
+
+    figure = new_figure(180.0, 130.0)
+    panels = figure.subplots(2, 2, sharex=True, sharey=True).ravel()
+    width = 0.8 / len(found.fields_mT)
+    place = np.arange(len(PARAMETERS))
+    for j, (axes, output) in enumerate(zip(panels, OUTPUTS, strict=True)):
+        for i, flux in enumerate(found.fields_mT):
+            at = place + (i - 0.5 * (len(found.fields_mT) - 1)) * width
+            colour = COLOURS[i % len(COLOURS)]
+            bars = {"height": 0.9 * width, "color": colour}
+            axes.barh(at, found.total[i, j], alpha=0.35, **bars)
+            axes.barh(at, found.first[i, j], label=f"{flux:g} mT", **bars)
+        axes.set_title(output, fontsize=9)
+        axes.set_yticks(place, list(PARAMETERS), fontsize=8)
+    panels[0].invert_yaxis()
+    panels[0].legend(fontsize=7, frameon=False)
+    figure.supxlabel(
+        "share of the variance: solid alone, pale with interactions", fontsize=9
+    )
     return figure

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from . import design, library
+from . import design, library, surrogate
 from .console import print_json, progress
 
 
@@ -124,4 +124,8 @@ def register(app: typer.Typer) -> None:
     app.command("train", epilog=TRAIN_EXAMPLE)(train)
     app.command("predict", epilog=PREDICT_EXAMPLE)(predict)
     app.command("design", epilog=design.EXAMPLE)(design.design)
+    app.command("sensitivity", epilog=surrogate.SENSITIVITY_EXAMPLE)(
+        surrogate.sensitivity
+    )
+    app.add_typer(surrogate.app, name="surrogate")
     app.add_typer(library.app, name="library")

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..core.errors import InputError
 from ..core.magnet import Magnet
+from ..core.specimen import Specimen
 from ..core.units import MU0
 from .fields import FLUX_LIMIT_T
 from .magnet_field import magnet_block
@@ -109,6 +110,32 @@ class Designs:
         return len(self.side_mm)
 
 
+def designs_of(
+    specimen: Specimen, flux_mT: float, *, angle_deg: float = 90.0
+) -> Designs:
+    """Return one specimen in a uniform field as a single design.
+
+    Raises
+    ------
+    InputError
+        If its sections differ in side or remanence.
+    """
+    if len(set(specimen.sides_mm)) > 1 or len(set(specimen.remanences_mT)) > 1:
+        raise InputError(
+            f"specimen {specimen.name!r} must have one side_mm and one remanence_mT "
+            "for all sections to be a design; solve it with `magbend sim shape`"
+        )
+    sections = specimen.sections
+    return Designs(
+        length_mm=np.array([[section.length_mm for section in sections]]),
+        E_MPa=np.array([[section.E_MPa for section in sections]]),
+        side_mm=np.array([specimen.sides_mm[0]]),
+        remanence_mT=np.array([specimen.remanences_mT[0]]),
+        flux_mT=np.array([flux_mT]),
+        angle_deg=np.array([angle_deg]),
+    )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shapes:
     """What `solve_shapes` found.
@@ -128,14 +155,20 @@ class Shapes:
     error_mm: Array
 
 
-def solve_shapes(designs: Designs, *, points: int = 61) -> Shapes:
+def solve_shapes(
+    designs: Designs, *, points: int = 61, by_section: bool = False
+) -> Shapes:
     """Solve every design and return its whole shape.
 
     Parameters
     ----------
     designs : Designs
     points : int
-        Equally spaced points from clamp to tip.
+        Points from clamp to tip.
+    by_section : bool
+        Instead of equal spacing over the rod, space the points equally within each
+        section, as many in each, so that every joint is one of them; `points` - 1 must
+        be a multiple of the number of sections.
 
     Notes
     -----
@@ -154,14 +187,31 @@ def solve_shapes(designs: Designs, *, points: int = 61) -> Shapes:
     out = np.empty((n, points, 5))
     status = np.empty(n, dtype=np.int8)
     error = np.empty(n)
-    stations = np.linspace(0.0, 1.0, points)
+    stations = np.linspace(0.0, 1.0, points)[None]
+    if by_section:
+        stations = _section_stations(rods[:, ::-1, 0], points)
+    stations = np.broadcast_to(stations, (n, points))
     fields = _fields(designs, total_mm)
     in_threads(_solve, stations, rods, fields, total_mm, margins, out, status, error)
     return Shapes(points=out, status=status, error_mm=error)
 
 
-def in_threads(kernel: Callable[..., None], shared: Array, *rows: NDArray) -> None:
-    """Call ``kernel(shared, *slices)`` on slices of rows, on all cores.
+def _section_stations(share: Array, points: int) -> Array:
+    n, k = share.shape
+    each = (points - 1) // k
+    if each * k != points - 1 or each < 1:
+        raise InputError(f"points - 1 must be a multiple of {k}; received {points}")
+    ends = np.cumsum(share, axis=1)
+    starts = ends - share
+    inside = np.arange(1, each + 1) / each
+    s = starts[:, :, None] + share[:, :, None] * inside
+    stations = np.concatenate([np.zeros((n, 1)), s.reshape(n, -1)], axis=1)
+    stations[:, -1] = 1.0
+    return stations
+
+
+def in_threads(kernel: Callable[..., None], *rows: NDArray) -> None:
+    """Call ``kernel(*slices)`` on slices of rows, on all cores.
 
     The kernel must release the interpreter (``nogil``). Threads rather than numba's
     parallel layer: that one compiles four times as long, aborts on concurrent calls
@@ -171,7 +221,7 @@ def in_threads(kernel: Callable[..., None], shared: Array, *rows: NDArray) -> No
     starts = range(0, n, ROWS_PER_CALL)
 
     def call(start: int) -> None:
-        kernel(shared, *(array[start : start + ROWS_PER_CALL] for array in rows))
+        kernel(*(array[start : start + ROWS_PER_CALL] for array in rows))
 
     if len(starts) <= 1:
         for start in starts:
@@ -213,7 +263,8 @@ def _fields(designs: Designs, total_mm: Array) -> Array:
 
 @njit(cache=True, nogil=True)
 def _solve(stations, rods, fields, total, margins, out, status, error):  # type: ignore[no-untyped-def]
-    curve = np.empty((4, stations.shape[0]))
+    points = stations.shape[1]
+    curve = np.empty((4, points))
     X = np.empty(STATE)
     D = np.empty((STATE, 4))
     T = np.empty((4, MAX_ORDER + 1))
@@ -222,7 +273,7 @@ def _solve(stations, rods, fields, total, margins, out, status, error):  # type:
     for i in range(rods.shape[0]):
         u[0] = u[2] = u[3] = 0.0
         u[1] = 1.0
-        curve[0] = stations
+        curve[0] = stations[i]
         curve[1] = 0.0
         status[i] = 2
         error[i] = math.nan
@@ -234,13 +285,13 @@ def _solve(stations, rods, fields, total, margins, out, status, error):  # type:
             status[i] = 2 if outcome == GONE else 3
             continue
         wrong = sharpen(rods[i], fields[i], 0.0, u, ORDER, STEP, X, D, T, C)
-        shape(rods[i], fields[i], u, ORDER + 4, STEP, stations, X, D, T, C, curve)
+        shape(rods[i], fields[i], u, ORDER + 4, STEP, stations[i], X, D, T, C, curve)
         if touches(fields[i], curve[0], curve[1], margins[i]):
             continue
         status[i] = 0 if outcome == OK_STABLE else 1
         error[i] = wrong * total[i]
-        for j in range(stations.shape[0]):
-            out[i, j, 0] = stations[j] * total[i]
+        for j in range(points):
+            out[i, j, 0] = stations[i, j] * total[i]
             out[i, j, 1] = curve[0, j] * total[i]
             out[i, j, 2] = curve[1, j] * total[i]
             out[i, j, 3] = curve[2, j]
