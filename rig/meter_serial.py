@@ -67,7 +67,7 @@ class SerialMeter:
         self._tap = tap
         self._last_s = 0.0
         self._buffer = b""
-        self._device = self._open()
+        self._device: Any = self._open()
         try:
             for command in description.setup:
                 self._send(command)
@@ -118,7 +118,7 @@ class SerialMeter:
         except (OSError, serial.SerialException) as error:
             logger.warning("%s: %s", self._port, error)
 
-    def _open(self) -> serial.SerialBase:
+    def _open(self) -> Any:
         line = self._description.line
         register_twin_urls()
         try:

@@ -235,9 +235,9 @@ def _interrupts_later() -> Iterator[None]:
     finally:
         for number in signals:
             signal.signal(number, previous[number])
-        for number, frame in received[:1]:
-            handler = previous[signal.Signals(number)]
+        for late, frame in received[:1]:
+            handler = previous[signal.Signals(late)]
             if callable(handler):
-                handler(number, frame)
+                handler(late, frame)
             elif handler == signal.SIG_DFL:
-                signal.raise_signal(number)
+                signal.raise_signal(late)

@@ -71,7 +71,7 @@ def change_percent(first: Image, second: Image) -> float:
     magnitude = np.abs(difference)
     noise = 1.4826 * float(np.median(magnitude))
     changed = magnitude > max(_NOISES * noise, _FLOOR)
-    return 100.0 * float(np.count_nonzero(changed)) / changed.size
+    return 100.0 * float(np.count_nonzero(changed)) / float(changed.size)
 
 
 def _binned(image: Image) -> NDArray[np.float32]:

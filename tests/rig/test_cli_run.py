@@ -115,7 +115,7 @@ def test_help_imports_nothing_heavy() -> None:
     script = (
         "import sys\nfrom magbend.cli.main import app\n"
         "try:\n    app(['rig', '--help'])\nexcept SystemExit:\n    pass\n"
-        "heavy = {'numpy', 'cv2', 'serial', 'pydantic', 'rich', 'scipy', 'numba'}\n"
+        "heavy = {'numpy', 'cv2', 'serial', 'rich', 'scipy', 'numba'}\n"
         "sys.exit(str(heavy & set(sys.modules)) if heavy & set(sys.modules) else 0)\n"
     )
     done = subprocess.run(
