@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 WORK_PX = 1000
 """The longer side of the working picture, roughly."""
 
-_SAMPLE = 8000
+_SAMPLE = 3000
 _LEAST_DARK = 30
 """Fewer dark pixels than this in the working picture are no rod."""
 

@@ -232,7 +232,22 @@ def _sample(
     """Fill the strip: one row a station, columns along the normal, centre on it."""
     count, columns = strip.shape
     middle = columns // 2
+    height, width = grey.shape
+    reach = middle * step
     for i in range(count):
+        x, y = points[i, 0], points[i, 1]
+        u, v = normals[i, 0] * step, normals[i, 1] * step
+        if reach < x < width - 1.001 - reach and reach < y < height - 1.001 - reach:
+            # Well inside: no sample needs to be checked.
+            for k in range(columns):
+                px, py = x + (k - middle) * u, y + (k - middle) * v
+                j, m = int(px), int(py)
+                fx, fy = np.float32(px - j), np.float32(py - m)
+                a, b = grey[m, j], grey[m, j + 1]
+                c, d = grey[m + 1, j], grey[m + 1, j + 1]
+                top = a + (b - a) * fx
+                strip[i, k] = sign * (top + (c + (d - c) * fx - top) * fy)
+            continue
         for k in range(columns):
             t = (k - middle) * step
             strip[i, k] = sign * _bilinear(

@@ -18,7 +18,8 @@ from .track import Start
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 
-_PASSES = 4
+_PASSES = 5
+_STILL_PX = 0.1
 
 ROOT_CLEAR = 0.3
 """Widths next to the clamp that are left out of the fit."""
@@ -87,6 +88,7 @@ class _State:
     first: float
     last: float
     scatter: float = 0.0
+    moved: float = 0.0
 
 
 def refine(
@@ -121,7 +123,11 @@ def refine(
     state = _State(start.curve, -half, half, start.width, 1.0, 0.0, start.curve.s[-1])
     result = None
     for turn in range(_PASSES):
+        length = float(state.curve.s[-1])
         result = _pass(grey, state, root, sign, joints, turn)
+        still = abs(state.curve.s[-1] - length) + abs(state.moved) < _STILL_PX
+        if turn >= 2 and still:
+            break
     if result is None:
         raise LostError("no_rod", "nothing was measured")
     return result
@@ -157,6 +163,7 @@ def _pass(
     at = fit.curve.s + first
     smooth, sigma = _smooth_width(curve.s, edges, good, at, state.width)
     state.curve, state.first, state.last = fit.curve, 0.0, float(fit.curve.s[-1])
+    state.moved = first
     state.low, state.high = -0.5 * smooth, 0.5 * smooth
     kept = _at_stations(edges, curve.s, at)
     return Refined(
@@ -278,7 +285,7 @@ def _fit(
         "joints": joints(curve),
     }
     fit = fit_curve(s - first, measured, weights, theta=theta, **options)  # type: ignore[arg-type]
-    if turn >= 1:
+    if turn >= 2:
         outlying = np.abs(np.nan_to_num(fit.residual)) > 4.0 * fit.noise + 1e-3
         if outlying.any() and (used & ~outlying).sum() > 0.5 * used.sum():
             used = used & ~outlying

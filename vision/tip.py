@@ -136,11 +136,13 @@ def line_through(across: Array, crossing: Array) -> EndFace | None:
         return None
     for _ in range(3):
         x, y = across[good], crossing[good]
-        slope = float((x - x.mean()) @ y / ((x - x.mean()) @ x))
-        place = float(y.mean() - slope * x.mean())
+        centre, mean = x.mean(), y.mean()
+        slope = float((x - centre) @ y / ((x - centre) @ x))
+        place = float(mean - slope * centre)
         residual = crossing - place - slope * across
-        spread = 1.4826 * np.nanmedian(np.abs(residual[good])) + 0.02
-        kept = np.isfinite(crossing) & (np.abs(residual) < 3.5 * spread)
+        distance = np.abs(residual)
+        spread = 1.4826 * float(np.sort(distance[good])[len(x) // 2]) + 0.02
+        kept = distance < 3.5 * spread  # false where a lane does not cross
         if kept.sum() < 4 or np.array_equal(kept, good):
             break
         good = kept

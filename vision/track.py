@@ -129,7 +129,11 @@ def _predict(recent: Array, step: float) -> tuple[Array, Array]:
     """Return the next point before the first and the unit direction root to tip."""
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(recent, axis=0).T))])
     degree = 2 if len(recent) >= 6 else 1
-    x, y = (np.polynomial.Polynomial.fit(along, recent[:, k], degree) for k in (0, 1))
-    point = np.array([x(-step), y(-step)])
-    direction = np.array([x.deriv()(-step), y.deriv()(-step)])
+    u = along / along[-1]
+    design = u[:, None] ** np.arange(degree + 1)
+    c = np.linalg.solve(design.T @ design, design.T @ recent)
+    at = -step / along[-1]
+    powers = at ** np.arange(degree + 1)
+    point = powers @ c
+    direction = c[1] if degree == 1 else c[1] + 2.0 * at * c[2]
     return point, direction / np.hypot(*direction)
