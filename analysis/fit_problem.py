@@ -328,31 +328,61 @@ def residuals(problem: Problem, unknowns: Array) -> tuple[Array, Array]:
     )
 
 
+def misfit(problem: Problem, unknowns: Array) -> Array:
+    """Return the residuals alone, as `residuals` does, at a fifth of its cost."""
+    parts = []
+    for shot in problem.shots:
+        values = _values(problem, shot, unknowns)
+        xy_mm = _shape(shot, *_model(problem, shot, values))
+        parts.append(
+            np.full(len(shot.sd_mm), WALL)
+            if xy_mm is None
+            else _seen(shot, values, xy_mm)[0]
+        )
+    return np.concatenate(parts)
+
+
+def _shape(
+    shot: Shot,
+    specimen: Specimen,
+    field: sim.UniformField | sim.MagnetField,
+    support: sim.Support,
+) -> Array | None:
+    """Return the predicted points, shape (n, 2), None where there is no equilibrium."""
+    shape = sim.solve(specimen, field, support=support, points=241).centreline
+    if shape is None:
+        return None
+    return np.column_stack(position_at(shape, _stations(shot)))
+
+
+def _stations(shot: Shot) -> Array:
+    # A measured line may be a little longer than the rod, never asked beyond its tip.
+    return np.minimum(shot.line.s_mm, shot.specimen.length_mm)
+
+
 def _shot_residuals(
     problem: Problem, shot: Shot, unknowns: Array
 ) -> tuple[Array, Array]:
     values = _values(problem, shot, unknowns)
     specimen, field, support = _model(problem, shot, values)
+    xy_mm = _shape(shot, specimen, field, support)
+    if xy_mm is None:
+        # No equilibrium at these values: a wall that sends the search back.
+        count = len(shot.sd_mm)
+        return np.full(count, WALL), np.zeros((count, problem.size))
     names = [*(f"E_MPa[{i}]" for i in range(len(specimen.sections)))]
     names += ["clamp_angle_deg", "load_factor"]
     if any(support.gravity_m_s2):
         names += ["gravity_m_s2[0]", "gravity_m_s2[1]"]
-    count = len(shot.line.s_mm)
-    # A measured line may be a little longer than the rod, never asked beyond its tip.
-    s_mm = np.minimum(shot.line.s_mm, specimen.length_mm)
-    shape = sim.solve(specimen, field, support=support, points=241).centreline
-    if shape is None:
-        # No equilibrium at these values: a wall that sends the search back.
-        return np.full(count, WALL), np.zeros((count, problem.size))
     result = sim.sensitivities(
-        specimen, field, parameters=names, support=support, s_mm=s_mm
+        specimen, field, parameters=names, support=support, s_mm=_stations(shot)
     )
-    x, y = position_at(shape, s_mm)
     slopes = {
         name: np.column_stack([result.dx_mm[:, k], result.dy_mm[:, k]])
         for k, name in enumerate(names)
     }
-    return _seen(problem, shot, values, np.column_stack([x, y]), slopes)
+    residual, seen = _seen(shot, values, xy_mm)
+    return residual, _derivatives(problem, shot, values, seen, slopes)
 
 
 def _values(problem: Problem, shot: Shot, unknowns: Array) -> dict[str, float]:
@@ -397,14 +427,17 @@ def _model(
     return specimen, shot.field, support
 
 
-def _seen(
-    problem: Problem,
-    shot: Shot,
-    values: dict[str, float],
-    xy_mm: Array,
-    slopes: dict[str, Array],
-) -> tuple[Array, Array]:
-    """Turn the prediction into the measured frame and project on the normals.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _View:
+    """How the predicted points of one shot are seen: rotation, scale, turned points."""
+
+    rotation: Array
+    scale: float
+    turned: Array
+
+
+def _seen(shot: Shot, values: dict[str, float], xy_mm: Array) -> tuple[Array, _View]:
+    """Turn the prediction into the measured frame; return the residuals across it.
 
     The measured frame leaves the clamp along the rod: it is turned back by the clamp's
     angle, then by the error of the frame, shifted across, and scaled.
@@ -416,42 +449,52 @@ def _seen(
     c, s = math.cos(turn), math.sin(turn)
     rotation = np.array([[c, -s], [s, c]])
     turned = xy_mm @ rotation.T
-    around = np.column_stack([-turned[:, 1], turned[:, 0]])
     shift = np.array([0.0, values.get("clamp_position_mm", 0.0)])
     measured = np.column_stack([shot.line.x_mm, shot.line.y_mm])
-    weight = 1.0 / shot.sd_mm
+    residual = _across(shot, measured - scale * turned - shift)
+    return residual, _View(rotation=rotation, scale=scale, turned=turned)
 
-    def across(vectors: Array) -> Array:
-        return np.asarray(np.sum(vectors * shot.normals, axis=1) * weight)
 
-    turned_slopes = {n: scale * v @ rotation.T for n, v in slopes.items()}
-    load = turned_slopes["load_factor"]
-    size, base = problem.size, problem.support
-    jacobian = np.zeros((len(weight), size))
-    load_value = _model(problem, shot, values)[2].load_factor
-    for k, name in enumerate(problem.names):
-        if name.startswith("E_MPa"):
-            jacobian[:, k] = -across(turned_slopes[name]) * values[name]
-        else:
-            jacobian[:, k] = -across(load) * load_value
+def _across(shot: Shot, vectors: Array) -> Array:
+    """Return the parts of vectors across the line, in standard deviations."""
+    return np.asarray(np.sum(vectors * shot.normals, axis=1) / shot.sd_mm)
+
+
+def _derivatives(
+    problem: Problem,
+    shot: Shot,
+    values: dict[str, float],
+    view: _View,
+    slopes: dict[str, Array],
+) -> Array:
+    """Return the derivatives of the residuals, shape (n, p + q)."""
+    seen = {
+        name: view.scale * slope @ view.rotation.T for name, slope in slopes.items()
+    }
+    load = seen["load_factor"] * _model(problem, shot, values)[2].load_factor
+    around = view.scale * np.column_stack([-view.turned[:, 1], view.turned[:, 0]])
     degree = math.pi / 180.0
+    gravity = problem.support.gravity_m_s2
+    columns = {
+        "clamp_angle_deg": lambda: seen["clamp_angle_deg"] - degree * around,
+        "frame_angle_deg": lambda: degree * around,
+        "scale_percent": lambda: view.turned / 100.0,
+        "clamp_position_mm": lambda: np.tile([0.0, 1.0], (len(shot.sd_mm), 1)),
+        "magnet_percent": lambda: load / (100.0 + values["magnet_percent"]),
+        "weight_percent": lambda: (
+            (
+                seen["gravity_m_s2[0]"] * gravity[0]
+                + seen["gravity_m_s2[1]"] * gravity[1]
+            )
+            / 100.0
+        ),
+    }
+    jacobian = np.zeros((len(shot.sd_mm), problem.size))
+    for k, name in enumerate(problem.names):
+        slope = seen[name] * values[name] if name.startswith("E_MPa") else load
+        jacobian[:, k] = -_across(shot, slope)
     for k, (name, index) in enumerate(problem.nuisances):
-        if index != (shot.step if name in PER_SHOT else shot.run):
-            continue
-        if name == "clamp_angle_deg":
-            slope = turned_slopes[name] - scale * degree * around
-        elif name == "frame_angle_deg":
-            slope = scale * degree * around
-        elif name == "scale_percent":
-            slope = turned / 100.0
-        elif name == "clamp_position_mm":
-            slope = np.tile([0.0, 1.0], (len(weight), 1))
-        elif name == "magnet_percent":
-            slope = load * load_value / (100.0 + values[name])
-        else:
-            slope = (
-                turned_slopes["gravity_m_s2[0]"] * base.gravity_m_s2[0]
-                + turned_slopes["gravity_m_s2[1]"] * base.gravity_m_s2[1]
-            ) / 100.0
-        jacobian[:, len(problem.names) + k] = -across(slope) * problem.nuisance_sd[k]
-    return across(measured - scale * turned - shift), jacobian
+        if index == (shot.step if name in PER_SHOT else shot.run):
+            column = _across(shot, columns[name]()) * problem.nuisance_sd[k]
+            jacobian[:, len(problem.names) + k] = -column
+    return jacobian

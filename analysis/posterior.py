@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.errors import InputError, MissingExtraError
+from ..core.errors import InputError, MagbendError, MissingExtraError
 from ..core.progress import Progress, silent
 from .fit import PRIOR_RANGE_MPA, FitResult
-from .fit_problem import residuals
+from .fit_problem import misfit, residuals
 
 Array = NDArray[np.float64]
 
@@ -111,7 +111,10 @@ def sample_posterior(
 
     def log_probability(u: Array) -> float:
         held[:p] = u
-        data, _ = residuals(problem, held)
+        try:
+            data = misfit(problem, held)
+        except MagbendError:
+            return -math.inf  # moduli for which nothing can be solved
         seen = nuisance.T @ data
         chi2 = float(data @ data - seen @ inner @ seen) * scale
         return -0.5 * (chi2 + float(np.sum(((u - centre) / width) ** 2)))

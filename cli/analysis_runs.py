@@ -284,7 +284,7 @@ def probe(
             print_json({"remanence_mT": remanence, "standoff_mm": standoff})
         else:
             typer.echo(
-                f"remanence {remanence:.2f} mT at a stand-off of {standoff:.3f} mm"
+                f"remanence {remanence:.1f} mT at a stand-off of {standoff:.3f} mm"
             )
         return
     if json:
@@ -346,7 +346,7 @@ def _nuisance(hold: Sequence[str], prior: Sequence[str]) -> Any:
 
     from ..analysis.fit_problem import NUISANCE_NAMES, Nuisance
 
-    values: dict[str, float] = {}
+    values = dict.fromkeys(NUISANCE_NAMES if "all" in hold else hold, 0.0)
     for text in prior:
         name, _, number = text.partition("=")
         try:
@@ -355,8 +355,6 @@ def _nuisance(hold: Sequence[str], prior: Sequence[str]) -> Any:
             raise typer.BadParameter(
                 f"must be NAME=SD; instead received {text!r}", param_hint="--prior"
             ) from None
-    for name in NUISANCE_NAMES if "all" in hold else hold:
-        values[name] = 0.0
     unknown = [name for name in values if name not in NUISANCE_NAMES]
     if unknown:
         raise typer.BadParameter(
@@ -386,10 +384,9 @@ def _print_comparison(table: pd.DataFrame, done: Sequence[RunComparison]) -> Non
     for row in table.to_dict("records"):
         view.add_row(*(_cell(row[name], form) for _, name, form in shown))
     console = Console()
-    # A pipe has no width of its own: rows stay whole.
-    console.width = (
-        max(console.width, 120) if not console.is_terminal else console.width
-    )
+    if not console.is_terminal:
+        # A pipe has no width of its own: every row stays on one line.
+        console = Console(width=240)
     console.print(view)
     for run in done:
         for warning in run.run.warnings:

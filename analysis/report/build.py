@@ -158,7 +158,8 @@ def number(value: Any, digits: int = 3) -> str:
         return "–"
     if isinstance(value, float) and math.isinf(value):
         return "∞"
-    return f"{value:.{digits}f}"
+    # Adding zero turns the -0.0 of a rounded small number into 0.0.
+    return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def _section(
