@@ -27,19 +27,28 @@ app.command("demo", epilog=bench.DEMO_EXAMPLE)(bench.demo)
 app.command("doctor", epilog=bench.DOCTOR_EXAMPLE)(bench.doctor)
 
 
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        typer.echo(f"magbend {version('magbend')}")
+        raise typer.Exit
+
+
 @app.callback()
 def options(
     debug: bool = typer.Option(False, "--debug", help="Show tracebacks of errors."),
-    version: bool = typer.Option(False, "--version", help="Print the version."),
+    _version: bool = typer.Option(
+        False,
+        "--version",
+        help="Print the version.",
+        callback=_print_version,
+        is_eager=True,
+    ),
 ) -> None:
     """Options of every command."""
     if debug:
         os.environ["MAGBEND_DEBUG"] = "1"
-    if version:
-        from importlib.metadata import version as version_of
-
-        typer.echo(f"magbend {version_of('magbend')}")
-        raise typer.Exit
 
 
 def main() -> None:

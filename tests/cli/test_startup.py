@@ -27,8 +27,8 @@ HEAVY = (
 
 PROBE = """
 import json, sys
-from magbend.cli.main import app
 sys.argv = ["magbend", *{arguments!r}]
+from magbend.cli.main import app
 try:
     app()
 except SystemExit as stop:
