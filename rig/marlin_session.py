@@ -1,0 +1,159 @@
+"""The conversation with a Marlin board: one line, one ``ok``, keep-alives between.
+
+Read in MarlinFirmware's own sources, not run on hardware: ``ok`` ends every line,
+``echo:busy: processing`` says that a long one still runs, ``start`` is a restart.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from .clock import Clock
+from .link import Link
+from .stage import PositionLostError, StageError, StageTimeoutError
+
+_SLICE_S = 0.1
+_NUMBER = r"(-?\d+(?:\.\d+)?)"
+
+
+def nothing() -> None:
+    """Check nothing while waiting."""
+
+
+class MarlinSession:
+    """Talk to one board over an open link.
+
+    Attributes
+    ----------
+    restarts : int
+        How often the board said ``start``.
+    """
+
+    def __init__(self, link: Link, clock: Clock, *, answer_timeout_s: float) -> None:
+        self._link = link
+        self._clock = clock
+        self._answer_timeout_s = answer_timeout_s
+        self.restarts = 0
+        self.halted = False
+
+    def drain(self) -> None:
+        """Read what is already here."""
+        while (line := self._link.waiting_line()) is not None:
+            self._note(line)
+
+    def listen(self, duration_s: float) -> list[str]:
+        """Read lines until it has been quiet for `duration_s`."""
+        lines = []
+        while (line := self._link.read_line(duration_s)) is not None:
+            self._note(line)
+            lines.append(line)
+        return lines
+
+    def command(
+        self,
+        line: str,
+        *,
+        timeout_s: float | None = None,
+        check: Callable[[], None] = nothing,
+    ) -> list[str]:
+        """Send one line and return what came before its ``ok``.
+
+        Raises
+        ------
+        PositionLostError
+            The board restarted or was halted.
+        StageError
+            It refused the line.
+        StageTimeoutError
+            It did not answer and sent no keep-alive either.
+        """
+        self.drain()
+        limit_s = self._answer_timeout_s if timeout_s is None else timeout_s
+        restarts, lines = self.restarts, list[str]()
+        self._link.write(line.encode("ascii") + b"\n")
+        deadline_s = self._clock.monotonic_s() + limit_s
+        while self._clock.monotonic_s() < deadline_s:
+            answer = self._link.read_line(_SLICE_S)
+            if answer is None:
+                check()
+                continue
+            self._note(answer)
+            if self.restarts != restarts or self.halted:
+                raise PositionLostError(
+                    f"the board restarted or was halted ({answer}); home it "
+                    "(magbend rig home)"
+                )
+            if answer == "ok" or answer.startswith("ok "):
+                return lines
+            if answer.startswith("Error:") or "Unknown command" in answer:
+                raise StageError(f"the stage refused {line!r}: {answer}")
+            lines.append(answer)
+        raise StageTimeoutError(
+            f"the stage did not finish {line!r} within {limit_s:.0f} s"
+        )
+
+    def _note(self, line: str) -> None:
+        if line == "start":
+            self.restarts += 1
+            self.halted = False
+        elif "kill() called" in line or "Printer halted" in line:
+            self.halted = True
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MarlinSetup:
+    """Steps/mm, ceilings and travel of one axis, in mm and s."""
+
+    steps_per_mm: float
+    max_feed_mm_s: float
+    acceleration_mm_s2: float
+    travel_mm: tuple[float, float] | None
+
+
+def read_setup(lines: Sequence[str], axis: str) -> MarlinSetup:
+    """Read the answers to ``M503`` and ``M211``.
+
+    Raises
+    ------
+    StageError
+        If a value is missing or not above zero: the sentence names the code.
+    """
+    values = {}
+    for code, meaning in (
+        ("M92", "steps/mm"), ("M203", "max. feed in mm/s"),
+        ("M201", "max. acceleration in mm/s2"),
+    ):  # fmt: skip
+        pattern = re.compile(rf"\b{code}\b.*?\b{axis}{_NUMBER}")
+        found = next((m for line in lines if (m := pattern.search(line))), None)
+        if found is None or float(found.group(1)) <= 0.0:
+            raise StageError(
+                f"the board does not report {code} {axis} ({meaning}) above zero; "
+                f"set it with {code} {axis}... and save it with M500"
+            )
+        values[code] = float(found.group(1))
+    return MarlinSetup(
+        steps_per_mm=values["M92"],
+        max_feed_mm_s=values["M203"],
+        acceleration_mm_s2=values["M201"],
+        travel_mm=_travel(lines, axis),
+    )
+
+
+def _travel(lines: Sequence[str], axis: str) -> tuple[float, float] | None:
+    pattern = re.compile(
+        rf"Min:.*?\b{axis}\s*{_NUMBER}.*?Max:.*?\b{axis}\s*{_NUMBER}", re.DOTALL
+    )
+    found = pattern.search("\n".join(lines))
+    return (float(found.group(1)), float(found.group(2))) if found else None
+
+
+def read_position(lines: Sequence[str], axis: str, steps_per_mm: float) -> float | None:
+    """Read ``M114`` in mm: the counted steps where given, else the planned place."""
+    text = " ".join(lines)
+    counted = re.search(rf"Count.*?\b{axis}:\s*{_NUMBER}", text)
+    if counted:
+        return float(counted.group(1)) / steps_per_mm
+    planned = re.search(rf"\b{axis}:\s*{_NUMBER}", text)
+    return float(planned.group(1)) if planned else None

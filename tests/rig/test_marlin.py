@@ -1,0 +1,178 @@
+"""The Marlin driver against a small board that answers as Marlin's sources say."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from magbend.core.errors import StageError
+from magbend.rig.clock import SteppedClock
+from magbend.rig.gap_stage import GapStage
+from magbend.rig.marlin import MarlinStage
+from magbend.rig.marlin_session import read_position, read_setup
+from magbend.rig.stage import PositionLostError, StageTimeoutError, StoppedError
+from magbend.rig.stage_config import LimitsConfig, StageConfig
+from magbend.rig.virtual.protocol_twin import register_board
+
+M503 = """echo:  G21    ; Units in mm (mm)
+echo:; Steps per unit:
+echo: M92 X80.00 Y80.00 Z400.00 E93.00
+echo:; Max feedrates (units/s):
+echo:  M203 X10.00 Y10.00 Z5.00 E25.00
+echo:; Max Acceleration (units/s2):
+echo:  M201 X50.00 Y50.00 Z100.00 E10000.00"""
+M211 = "echo:Soft endstops: On  Min: X0.00 Y0.00 Z0.00   Max: X200.00 Y200.00 Z180.00"
+
+
+class MarlinBoard:
+    """What `twin://` asks of a board; lines in, lines out, moves that take time."""
+
+    def __init__(self) -> None:
+        self.now_s = self._free_s = 0.0
+        self.plugged, self.port_taken, self.restart_on_open = True, False, False
+        self._line = b""
+        self._out: list[tuple[float, bytes]] = []
+        self.x_mm = 37.0
+        self.homed = self.silent = self.short = False
+        self.seen: list[str] = []
+        self.say("start\necho:Marlin 2.1.2.4", 0.5)
+
+    def say(self, text: str, at_s: float) -> None:
+        for line in text.splitlines():
+            self._out.append((at_s, line.encode() + b"\n"))
+
+    def advance(self, duration_s: float) -> None:
+        self.now_s += duration_s
+
+    def read(self) -> bytes:
+        ready = [data for time_s, data in self._out if time_s <= self.now_s]
+        self._out = [item for item in self._out if item[0] > self.now_s]
+        return b"".join(ready)
+
+    def receive(self, data: bytes) -> None:
+        self._line += data
+        while b"\n" in self._line:
+            line, self._line = self._line.split(b"\n", 1)
+            self.seen.append(line.decode())
+            if not self.silent:
+                self._answer(line.decode())
+
+    def _answer(self, line: str) -> None:
+        now = self.now_s + 0.01
+        if line == "M115":
+            self.say("FIRMWARE_NAME:Marlin 2.1.2.4 MACHINE_TYPE:Stage", now)
+        elif line == "M503":
+            self.say(M503, now)
+        elif line == "M211":
+            self.say(M211, now)
+        elif line.startswith("G28"):
+            self.x_mm, self.homed = 0.0, True
+            self._free_s = now + 9.0
+            for second in (2, 4, 6, 8):
+                self.say("echo:busy: processing", now + second)
+            now = self._free_s
+        elif match := re.match(r"G1 X(\S+) F(\S+)", line):
+            distance = float(match[1]) - self.x_mm
+            self._free_s = now + abs(distance) / (float(match[2]) / 60.0)
+            self.x_mm += distance * (0.5 if self.short else 1.0)
+        elif line == "M400":
+            now = max(now, self._free_s)
+        elif line == "M114":
+            steps = round(self.x_mm * 80)
+            self.say(f"X:{self.x_mm:.2f} Y:0.00 Z:0.00 E:0.00 Count X:{steps} Y:0", now)
+        self.say("ok", now)
+
+
+@pytest.fixture
+def bench(tmp_path, monkeypatch):
+    monkeypatch.setenv("MAGBEND_RUNTIME_DIR", str(tmp_path))
+    clock, board = SteppedClock(), MarlinBoard()
+    config = StageConfig(
+        driver="marlin", port=register_board("marlin", board, clock),
+        gap_at_zero_mm=160.0, direction=-1, steps_per_mm=80.0, feed_mm_min=600.0,
+    )  # fmt: skip
+    bounds = LimitsConfig(min_gap_mm=45.0, max_gap_mm=155.0)
+    stage = GapStage(MarlinStage(config, clock), config, bounds, clock)
+    return board, stage, clock
+
+
+def test_it_homes_its_axis_alone_and_goes_to_gaps(bench):
+    board, stage, _ = bench
+    stage.connect()
+    with pytest.raises(PositionLostError):
+        stage.goto_gap(60.0)
+    stage.home()
+    record = stage.goto_gap(60.0)
+    assert record.gap_mm == pytest.approx(60.0, abs=0.02)
+    assert record.duration_s >= 100.0 / 10.0
+    assert "G28 X" in board.seen
+    assert stage.limits.travel_mm == (0.0, 200.0)
+    assert max(_steps(board.seen)) <= 10.0 + 1e-6
+
+
+def _steps(lines: list[str]) -> list[float]:
+    places = [float(m[1]) for line in lines if (m := re.match(r"G1 X(\S+)", line))]
+    return [abs(b - a) for a, b in zip([0.0, *places], places, strict=False)]
+
+
+def test_an_ok_is_queued_not_arrived(bench):
+    board, stage, _ = bench
+    stage.connect()
+    stage.home()
+    stage.goto_gap(150.0)
+    moves = [i for i, line in enumerate(board.seen) if line.startswith("G1")]
+    assert all(board.seen[i + 1] == "M400" for i in moves)
+
+
+def test_a_restart_loses_the_position(bench):
+    board, stage, clock = bench
+    stage.connect()
+    stage.home()
+    board.say("start", board.now_s)
+    clock.sleep(0.1)
+    with pytest.raises(PositionLostError):
+        stage.goto_gap(60.0)
+    assert stage.position_state == "unknown"
+
+
+def test_stopping_short_and_silence_are_unverified(bench):
+    board, stage, _ = bench
+    stage.connect()
+    stage.home()
+    board.short = True
+    with pytest.raises(StageTimeoutError, match="instead of"):
+        stage.goto_gap(150.0)
+    assert stage.position_state == "unverified"
+    board.short = False
+    stage.home()
+    stage.goto_gap(150.0)
+    board.silent = True
+    assert stage.status().state == "silent"
+
+
+def test_a_stop_from_outside_ends_after_one_piece(bench):
+    board, stage, _ = bench
+    stage.connect()
+    stage.home()
+    before = len(board.seen)
+    stage.request_stop()
+    with pytest.raises(StoppedError):
+        stage.goto_gap(60.0)
+    assert not any(line.startswith("G1") for line in board.seen[before:])
+    assert stage.position_state == "homed"
+
+
+def test_settings_are_audited_by_name():
+    lines = M503.splitlines()
+    assert read_setup([*lines, M211], "X").travel_mm == (0.0, 200.0)
+    with pytest.raises(StageError, match="M92 X"):
+        read_setup([line.replace("X80.00", "X0.00") for line in lines], "X")
+    with pytest.raises(StageError, match="M203"):
+        read_setup([line for line in lines if "M203" not in line], "X")
+
+
+def test_the_counted_steps_are_believed_before_the_planned_position():
+    assert read_position(["X:99.00 Y:0 Count X:800 Y:0"], "X", 80.0) == 10.0
+    assert read_position(["X:12.50 Y:0.00 Z:0.00"], "X", 80.0) == 12.5
+    assert read_position(["busy"], "X", 80.0) is None
