@@ -12,20 +12,17 @@ remanence of each trained specimen. `outside` says when a question leaves what i
 
 from __future__ import annotations
 
-import io
-import json
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.checks import positive
-from ..core.errors import InputError, StoreError
-from ..core.files import write_bytes
+from ..core.errors import InputError
+from .model_file import DAMAGE, damaged, read_model, write_model
 
 Array = NDArray[np.float64]
 
@@ -158,21 +155,12 @@ def _rows(inputs: ArrayLike) -> Array:
 
 def save(model: ExpansionModel, path: Path) -> None:
     """Write a model to one ``.npz`` file (arrays and a JSON card, no pickle)."""
-    card = json.dumps(model.card, allow_nan=False).encode()
     arrays: dict[str, Any] = {
         f"weights/{name}": value for name, value in model.weights.items()
     }
-    buffer = io.BytesIO()
-    np.savez_compressed(
-        buffer,
-        mean=model.mean,
-        scale=model.scale,
-        target_scale_per_mm=np.float64(model.target_scale_per_mm),
-        card=np.frombuffer(card, dtype=np.uint8),
-        schema=np.int64(_SCHEMA),
-        **arrays,
-    )
-    write_bytes(path, buffer.getvalue())
+    arrays |= {"mean": model.mean, "scale": model.scale, "schema": np.int64(_SCHEMA)}
+    arrays["target_scale_per_mm"] = np.float64(model.target_scale_per_mm)
+    write_model(path, arrays, model.card)
 
 
 def load(path: Path | None = None) -> ExpansionModel:
@@ -185,37 +173,23 @@ def load(path: Path | None = None) -> ExpansionModel:
     """
     source = path or Path(str(files(__package__) / "data" / "expansion.npz"))
     try:
-        with np.load(source, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
+        arrays, card = read_model(source)
+        if int(arrays["schema"]) != _SCHEMA or "domain" not in card:
+            raise ValueError("unknown schema")
+        weights = {
+            name.removeprefix("weights/"): np.asarray(value, dtype=np.float64)
+            for name, value in arrays.items()
+            if name.startswith("weights/")
+        }
         model = ExpansionModel(
-            weights={
-                name.removeprefix("weights/"): np.asarray(value, dtype=np.float64)
-                for name, value in arrays.items()
-                if name.startswith("weights/")
-            },
+            weights=weights,
             mean=np.asarray(arrays["mean"], dtype=np.float64),
             scale=np.asarray(arrays["scale"], dtype=np.float64),
             target_scale_per_mm=float(arrays["target_scale_per_mm"]),
-            card=json.loads(arrays["card"].tobytes()),
+            card=card,
         )
-        if int(arrays["schema"]) != _SCHEMA:
-            raise ValueError("unknown schema")
-        middle = predict(model, model.mean)
-        sound = bool(np.all(np.isfinite(middle))) and "domain" in model.card
-    except FileNotFoundError:
-        raise StoreError(f"{source}: there is no such model file") from None
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
-        raise StoreError(
-            f"{source}: is damaged or no expansion model ({_short(error)}); "
-            "train it again with `magbend analysis train --out FILE`"
-        ) from None
-    if not sound:
-        raise StoreError(
-            f"{source}: is damaged (weights that are not finite); "
-            "train it again with `magbend analysis train --out FILE`"
-        )
+        predict(model, model.mean)  # the arrays fit each other
+    except DAMAGE as error:
+        way_out = "magbend analysis train --out FILE"
+        raise damaged(source, "expansion model", error, way_out) from None
     return model
-
-
-def _short(error: Exception) -> str:
-    return " ".join(str(error).split())[:120] or type(error).__name__

@@ -15,21 +15,18 @@ smooth guess of the error's size, scaled to cover 95 % of designs kept out of th
 
 from __future__ import annotations
 
-import io
-import json
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.errors import InputError, StoreError
-from ..core.files import write_bytes
+from ..core.errors import InputError
 from ..core.units import MU0
 from ..sim.batch_shapes import Designs
+from .model_file import DAMAGE, damaged, read_model, write_model
 
 Array = NDArray[np.float64]
 
@@ -274,15 +271,7 @@ def save(model: Surrogate, path: Path) -> None:
         name: getattr(model, name).astype(small.get(name, np.float64))
         for name in _ARRAYS
     }
-    card = json.dumps(model.card, allow_nan=False).encode()
-    buffer = io.BytesIO()
-    np.savez_compressed(
-        buffer,
-        card=np.frombuffer(card, dtype=np.uint8),
-        schema=np.int64(_SCHEMA),
-        **arrays,
-    )
-    write_bytes(path, buffer.getvalue())
+    write_model(path, {**arrays, "schema": np.int64(_SCHEMA)}, model.card)
 
 
 def load(path: Path | None = None) -> Surrogate:
@@ -295,24 +284,17 @@ def load(path: Path | None = None) -> Surrogate:
     """
     source = path or Path(str(files(__package__) / "data" / "surrogate.npz"))
     try:
-        with np.load(source, allow_pickle=False) as archive:
-            if int(archive["schema"]) != _SCHEMA:
-                raise ValueError("unknown schema")
-            arrays = {name: archive[name].astype(np.float64) for name in _ARRAYS}
-            card = json.loads(archive["card"].tobytes())
-        arrays["powers"] = arrays["powers"].astype(np.int64)
-        if not all(np.all(np.isfinite(array)) for array in arrays.values()):
-            raise ValueError("numbers that are not finite")
+        found, card = read_model(source)
+        if int(found["schema"]) != _SCHEMA:
+            raise ValueError("unknown schema")
+        arrays: dict[str, Any] = {
+            name: found[name].astype(np.float64) for name in _ARRAYS
+        }
+        arrays["powers"] = found["powers"].astype(np.int64)
         model = Surrogate(card=card, **arrays)
-        legendre(np.zeros((1, len(FEATURES))), model.powers) @ model.coefficients @ (
-            model.modes
-        )
-    except FileNotFoundError:
-        raise StoreError(f"{source}: there is no such model file") from None
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
-        reason = " ".join(str(error).split())[:120] or type(error).__name__
-        raise StoreError(
-            f"{source}: is damaged or no surrogate ({reason}); fit it again with "
-            "`magbend analysis surrogate fit --out FILE`"
-        ) from None
+        one = legendre(np.zeros((1, len(FEATURES))), model.powers)
+        model.mean + one @ model.coefficients @ model.modes  # the arrays fit each other
+    except DAMAGE as error:
+        way_out = "magbend analysis surrogate fit --out FILE"
+        raise damaged(source, "surrogate", error, way_out) from None
     return model
