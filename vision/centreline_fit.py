@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _DEGREE = 3
-_SHARED = 8.0
+SHARED = 8.0
 """Stations 1 px apart that carry one station's worth of information: bilinear samples,
 compressed pictures and shade on the paper make neighbours alike."""
 
@@ -143,6 +143,7 @@ def fit_curve(
     iterations: int = 2,
     theta: Array | None = None,
     stiffness: float | None = None,
+    shared: float = SHARED,
 ) -> CurveFit:
     """Fit theta(s) to points measured near an even grid of arc length.
 
@@ -164,6 +165,8 @@ def fit_curve(
         Tangent angles to start from; otherwise from the points.
     stiffness : float, optional
         Weight of the penalty, px^5; the most likely one when not given.
+    shared : float
+        Neighbouring stations that count as one: the fewer, the more supple the curve.
 
     Returns
     -------
@@ -187,7 +190,9 @@ def fit_curve(
         jacobian = _jacobian(curve, basis_mid, coefficients)
         residual = np.sum((points - curve.points) * curve.normals, axis=1)
         residual[weight == 0.0] = 0.0
-        system = _solve(jacobian, residual, weight, penalty, coefficients, stiffness)
+        system = _solve(
+            jacobian, residual, weight, penalty, coefficients, stiffness, shared
+        )
         origin = origin + system.change[0] * curve.normals[0]
         coefficients = coefficients + system.change[1:]
     curve = _integrate(s, origin, coefficients, basis, basis_mid, slopes)
@@ -201,6 +206,7 @@ class _System:
     change: Array
     inverse_root: Array
     freedom: float
+    shared: float
 
 
 def _knots(first: float, last: float, spacing: float, joints: Sequence[float]) -> Array:
@@ -340,17 +346,17 @@ def _fill_jacobian(
 
 def _solve(
     jacobian: Array, residual: Array, weight: Array, penalty: Array,
-    coefficients: Array, strength: float | None,
+    coefficients: Array, strength: float | None, shared: float,
 ) -> _System:  # fmt: skip
     """Solve for the change, with the most likely weight of the penalty (REML).
 
-    Neighbouring residuals share pixels, so `_SHARED` of them count as one. One
+    Neighbouring residuals share pixels, so `shared` of them count as one. One
     eigenproblem serves every weight: with normal = L L^T and L^-1 P L^-T = U d U^T,
     normal + w P = (L U) (1 + w d) (L U)^T.
     """
     weighted = jacobian * weight[:, None]
-    normal = weighted.T @ jacobian / _SHARED
-    right = weighted.T @ residual / _SHARED
+    normal = weighted.T @ jacobian / shared
+    right = weighted.T @ residual / shared
     size = len(right)
     full = np.zeros((size, size))
     full[1:, 1:] = penalty
@@ -364,16 +370,16 @@ def _solve(
     z = inverse.T @ u
     force, bend = z.T @ right, z.T @ pull
     if strength is None:
-        total = float(np.sum(weight * residual**2)) / _SHARED
+        total = float(np.sum(weight * residual**2)) / shared
         stored = float(coefficients @ pull[1:])
-        count = float(np.count_nonzero(weight)) / _SHARED
+        count = float(np.count_nonzero(weight)) / shared
         strength = _most_likely(
             scale, d, force, bend, total, stored, max(count - 4.0, 1.0)
         )
     growth = 1.0 + strength * d
     root = z / np.sqrt(growth)
     change = z @ ((force - strength * bend) / growth)
-    return _System(change, root, float(np.sum(1.0 / growth)))
+    return _System(change, root, float(np.sum(1.0 / growth)), shared)
 
 
 def _ridge(normal: Array) -> Array:
@@ -405,7 +411,7 @@ def _with_covariance(
     squares = float(np.sum(weight[used] * residual[used] ** 2))
     noise = np.sqrt(squares / max(count - system.freedom, 1.0))
     correlation = _correlation(residual, weight)
-    root = system.inverse_root * noise * np.sqrt(correlation / _SHARED)
+    root = system.inverse_root * noise * np.sqrt(correlation / system.shared)
     return CurveFit(
         curve=curve,
         residual=residual,

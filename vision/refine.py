@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .centreline_fit import Curve, CurveFit, fit_curve
+from .centreline_fit import SHARED, Curve, CurveFit, fit_curve
 from .clamp import ClampLines, find_clamp
 from .edges import Edges, find_edges
 from .rod import Root
@@ -276,22 +276,37 @@ def _fit(
     used = (share > 0.99) & (s > first + root) & (s < last - clear)
     if used.sum() < 8:
         raise LostError("edges_lost", "too few edges of the rod are seen")
-    measured = points + offset[:, None] * np.column_stack(
+    measured = points + np.where(used, offset, 0.0)[:, None] * np.column_stack(
         [-np.sin(theta), np.cos(theta)]
     )
-    weights = used.astype(np.float64)
+    weights = _weights(used, width)
+    # Supple while the rod is sought, then stiff enough not to follow shade; the path
+    # of a rough rod (yarn) is no elastica, and stays supple.
+    supple = turn < 2 or state.scatter > 0.03 * width
     options = {
-        "spacing": max(1.5 * width, (last - first) / 50.0),
+        "spacing": max((1.0 if supple else 1.5) * width, (last - first) / 50.0),
         "joints": joints(curve),
+        "shared": 3.0 if supple else SHARED,
     }
     fit = fit_curve(s - first, measured, weights, theta=theta, **options)  # type: ignore[arg-type]
     if turn >= 2:
         outlying = np.abs(np.nan_to_num(fit.residual)) > 4.0 * fit.noise + 1e-3
         if outlying.any() and (used & ~outlying).sum() > 0.5 * used.sum():
             used = used & ~outlying
-            weights = used.astype(np.float64)
+            weights = _weights(used, width)
             fit = fit_curve(s - first, measured, weights, theta=theta, **options)  # type: ignore[arg-type]
     return fit, used
+
+
+def _weights(used: NDArray[np.bool_], width: float) -> Array:
+    """Weigh stations: a frayed end keeps a little of the shape it had before."""
+    weights = used.astype(np.float64)
+    seen = np.flatnonzero(used)
+    if len(used) - seen[-1] > 0.6 * width:
+        weights[seen[-1] + 1 :] = 0.03
+    if seen[0] > 0.6 * width:
+        weights[: seen[0]] = 0.03
+    return weights
 
 
 def _smooth_width(

@@ -51,7 +51,7 @@ def start_curve(
     sign : float
         -1 for a light rod.
     follow : bool
-        Whether to carry the curve on at the root.
+        Whether to carry the curve on at the root; at the tip it always is.
 
     Returns
     -------
@@ -75,6 +75,7 @@ def start_curve(
     centres = centre[good][:: max(1, int(0.4 * real))]
     if follow:
         centres = _follow(grey, centres[2:], real, sign, level)
+    centres = _follow(grey, centres[::-1], real, sign, level)[::-1]
     return Start(curve=smooth_curve(centres, spacing=2.0 * real), width=real)
 
 
