@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from ..core.errors import StageError
 from .clock import Clock
 from .grbl_protocol import FEED_HOLD, Message, Report, Setting
 from .grbl_session import CommandRefusedError, GrblSession
-from .stage import StageError, StageTimeoutError
+from .stage import StageTimeoutError
 from .stage_config import StageConfig
 
 _MOVING_STATES = ("run", "jog")

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 
+from ..core.errors import StageError
 from .clock import Clock
 from .grbl_protocol import (
     SOFT_RESET,
@@ -27,7 +28,7 @@ from .grbl_protocol import (
     parse_line,
 )
 from .link import Link
-from .stage import AlarmError, PositionLostError, StageError, StageTimeoutError
+from .stage import AlarmError, PositionLostError, StageTimeoutError
 
 logger = logging.getLogger(__name__)
 

@@ -10,9 +10,10 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from ..core.errors import StageError
 from .clock import Clock
 from .link import Link
-from .stage import PositionLostError, StageError, StageTimeoutError
+from .stage import PositionLostError, StageTimeoutError
 
 _SLICE_S = 0.1
 _NUMBER = r"(-?\d+(?:\.\d+)?)"

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import sys
-
 
 def register_twin_urls() -> None:
     """Let pyserial open ports named ``twin://...`` (see `protocol_twin`)."""
-    serial = sys.modules.get("serial")
-    if serial is None:
-        import serial
+    import serial
+
     packages = serial.protocol_handler_packages
     if __name__ not in packages:
         packages.append(__name__)

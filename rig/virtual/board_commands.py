@@ -31,13 +31,13 @@ def system_line(board: GrblBoard, line: str) -> Task:
     """
     body = line[1:]
     if not body:
-        yield from board._print(_HELP)
+        yield from board.print_line(_HELP)
     elif body[0] == "J":
         if board.state not in ("Idle", "Jog"):
             raise GcodeError(8)
         if not body.startswith("J="):
             raise GcodeError(3)
-        yield from board._run(read_line(body[2:], board.modal, jog=True), jog=True)
+        yield from board.run_order(read_line(body[2:], board.modal, jog=True), jog=True)
     elif body[0] in "$GCX":
         if len(body) > 1:
             raise GcodeError(3)
@@ -53,27 +53,27 @@ def _always(board: GrblBoard, body: str) -> Task:
         if board.state in ("Run", "Hold"):
             raise GcodeError(8)
         for row in board.eeprom.lines():
-            yield from board._print(row)
+            yield from board.print_line(row)
     elif body == "G":
-        yield from board._print(f"[GC:{board.modal.text()}]")
+        yield from board.print_line(f"[GC:{board.modal.text()}]")
     elif body == "X":
         if board.state == "Alarm":
-            yield from board._print("[MSG:Caution: Unlocked]")
+            yield from board.print_line("[MSG:Caution: Unlocked]")
             board.state = "Idle"
     elif board.state == "Check":
-        board._reset_from_anywhere()
-        yield from board._print("[MSG:Disabled]")
+        board.reset_from_anywhere()
+        yield from board.print_line("[MSG:Disabled]")
     else:
         if board.state != "Idle":
             raise GcodeError(8)
         board.state = "Check"
-        yield from board._print("[MSG:Enabled]")
+        yield from board.print_line("[MSG:Enabled]")
 
 
 def _standing(board: GrblBoard, body: str) -> Task:
     if body == "#":
         for row in board.offsets_report():
-            yield from board._print(row)
+            yield from board.print_line(row)
     elif body[0] == "H":
         if not board.eeprom.flag(22):
             raise GcodeError(5)
@@ -82,18 +82,18 @@ def _standing(board: GrblBoard, body: str) -> Task:
             raise GcodeError(3)  # and the state stays Home, as in the real one
         yield from home(board)
     elif body == "SLP":
-        board._flags.add("sleep")
+        board.flags.add("sleep")
     elif body == "I":
-        yield from board._print("[VER:1.1h.20190830:]")
-        yield from board._print("[OPT:V,15,128]")
+        yield from board.print_line("[VER:1.1h.20190830:]")
+        yield from board.print_line("[OPT:V,15,128]")
     elif body[0] == "N":
         yield from _startup(board, body)
     elif body.startswith("RST="):
         if body[4:] not in ("$", "#", "*"):
             raise GcodeError(3)
         board.eeprom.restore()
-        yield from board._print("[MSG:Restoring defaults]")
-        board._reset_from_anywhere()
+        yield from board.print_line("[MSG:Restoring defaults]")
+        board.reset_from_anywhere()
     else:
         yield from _store(board, body)
 
@@ -101,7 +101,7 @@ def _standing(board: GrblBoard, body: str) -> Task:
 def _startup(board: GrblBoard, body: str) -> Task:
     if body == "N":
         for index, text in enumerate(board.eeprom.startup):
-            yield from board._print(f"$N{index}={text}")
+            yield from board.print_line(f"$N{index}={text}")
         return
     match = re.fullmatch(r"N([01])=(.*)", body)
     if not match:
@@ -128,26 +128,26 @@ def _store(board: GrblBoard, body: str) -> Task:
     if code:
         raise GcodeError(code)
     # Writing the memory takes milliseconds with interrupts off: bytes are lost.
-    board._deaf_until_s = board.now_s + _EEPROM_S
-    yield from board._pause(_EEPROM_S)
+    board.lose_input(_EEPROM_S)
+    yield from board.pause(_EEPROM_S)
 
 
 def home(board: GrblBoard) -> Task:
     """``$H`` of the stock build: Z first, then X and Y."""
-    board._homing = True
+    board.homing = True
     for axes in ((2,), (0, 1)):
         yield from _home_axes(board, axes)
-        if board._abort:
-            board._homing = False
+        if board.aborted:
+            board.homing = False
             return
-    yield from board._realtime()
-    board._homing = False
-    if board._abort:
+    yield from board.realtime()
+    board.homing = False
+    if board.aborted:
         return
-    board._planned = list(board.position)
-    board._switches_seen = board.plant.switches()
+    board.planned = list(board.position)
+    board.switches_seen = board.plant.switches()
     board.state = "Idle"
-    yield from board._startup_lines()
+    yield from board.startup_lines()
 
 
 def _home_axes(board: GrblBoard, axes: tuple[int, ...]) -> Task:
@@ -162,12 +162,12 @@ def _home_axes(board: GrblBoard, axes: tuple[int, ...]) -> Task:
     for travel, rate, approach in phases:
         found = yield from _home_phase(board, axes, travel, rate, approach)
         if not found:
-            board._reset_from_anywhere()
-            yield from board._realtime()
+            board.reset_from_anywhere()
+            yield from board.realtime()
             return
         board.mover.kill()
-        board._flags.discard("cycle stop")
-        yield from board._pause(board.eeprom[26] / 1000.0)
+        board.flags.discard("cycle stop")
+        yield from board.pause(board.eeprom[26] / 1000.0)
     for axis in axes:
         reverse = int(board.eeprom[23]) >> axis & 1
         place = pull_off - board.eeprom[130 + axis] if reverse else -pull_off
@@ -208,12 +208,12 @@ def _home_phase(
             board.mover.locked |= closed
             if board.mover.locked & wanted == wanted:
                 return True
-        if "reset" in board._flags:
-            board._alarm = 6
+        if "reset" in board.flags:
+            board.alarm = 6
             return False
-        if "cycle stop" in board._flags:
+        if "cycle stop" in board.flags:
             if not approach and not closed:
                 return True
-            board._alarm = 9 if approach else 8
+            board.alarm = 9 if approach else 8
             return False
         yield board.now_s + _POLL_S

@@ -75,6 +75,13 @@ class GrblBoard:
         self.plugged = True
         self.port_taken = False
         self.restart_on_open = False
+        self.state = "Idle"
+        self.position = [0, 0, 0]
+        self.alarm = self.switches_seen = 0
+        self.homing = False
+        self.flags: set[str] = set()
+        self._rx: deque[int] = deque()
+        self._wake_s = 0.0
         self._power_up()
 
     # --- what the outside sees -------------------------------------------------
@@ -137,7 +144,7 @@ class GrblBoard:
 
     def assume_position(self, *, locked: bool) -> None:
         """Go on from `position` as if the power had never been cut."""
-        self._planned = list(self.position)
+        self.planned = list(self.position)
         self.state = "Alarm" if locked else "Idle"
         self.read()
 
@@ -165,17 +172,17 @@ class GrblBoard:
 
     def _watch_switches(self) -> None:
         switches = self.plant.switches()
-        closed = switches & ~self._switches_seen
-        self._switches_seen = switches
-        if closed and self.eeprom.flag(21) and not self._homing:
-            if self.state == "Alarm" or self._alarm:
+        closed = switches & ~self.switches_seen
+        self.switches_seen = switches
+        if closed and self.eeprom.flag(21) and not self.homing:
+            if self.state == "Alarm" or self.alarm:
                 return
-            self._reset_from_anywhere()
-            self._alarm = 1
+            self.reset_from_anywhere()
+            self.alarm = 1
 
     def _flag(self, name: str) -> None:
         """Set a flag and wake the main loop, wherever it waits."""
-        self._flags.add(name)
+        self.flags.add(name)
         self._wake_s = min(self._wake_s, self.now_s)
 
     def _on_step(self, axis: int, count: int) -> None:
@@ -189,19 +196,19 @@ class GrblBoard:
         self.state = "Alarm" if self.eeprom.flag(22) else "Idle"
         self.position = [0, 0, 0]
         self.overrides = [100, 100, 100]
-        self._switches_seen = self.plant.switches()
-        self._task: Task = self._firmware()
+        self.switches_seen = self.plant.switches()
+        self._task = self._firmware()
         self._wake_s = self._blocked_s = self.now_s
-        self._alarm = 0
-        self._homing = False
-        self._flags: set[str] = set()
-        self._rx: deque[int] = deque()
+        self.alarm = 0
+        self.homing = False
+        self.flags.clear()
+        self._rx.clear()
 
     def _on_byte(self, byte: int) -> None:
         if self.now_s < self._deaf_until_s:
             return
         if byte == 0x18:
-            self._reset_from_anywhere()
+            self.reset_from_anywhere()
         elif byte == 0x85:
             if self.state == "Jog":
                 self._flag("cancel")
@@ -216,13 +223,14 @@ class GrblBoard:
             self._rx.append(byte)
             self._wake_s = min(self._wake_s, self.now_s)
 
-    def _reset_from_anywhere(self) -> None:
-        if "reset" in self._flags:
+    def reset_from_anywhere(self) -> None:
+        """Set the reset flag, as the interrupt does; a moving stage stops, alarmed."""
+        if "reset" in self.flags:
             return
         self._flag("reset")
-        if self.state in ("Run", "Home", "Jog") or self._stopping or self._homing:
-            if not self._alarm:
-                self._alarm = 6 if self.state == "Home" else 3
+        if self.state in ("Run", "Home", "Jog") or self._stopping or self.homing:
+            if not self.alarm:
+                self.alarm = 6 if self.state == "Home" else 3
             self.mover.kill()
 
     # --- main loop ---------------------------------------------------------------
@@ -231,36 +239,36 @@ class GrblBoard:
         while True:
             self.overrides = [100, 100, 100]
             self.counters = Counters()
-            self._flags.clear()
-            self._alarm = 0
+            self.flags.clear()
+            self.alarm = 0
             self._rx.clear()
-            self._abort = self._suspended = self._stopping = False
+            self.aborted = self._suspended = self._stopping = False
             self._held = self._cancelling = self._soft_limit = False
-            self._homing = False
+            self.homing = False
             self.modal = Modal()
             self.g92 = [0.0, 0.0, 0.0]
             self.mover.kill()
-            self._planned = list(self.position)
-            yield from self._print(_BANNER)
+            self.planned = list(self.position)
+            yield from self.print_line(_BANNER)
             yield from self._main_loop()
 
     def _main_loop(self) -> Task:
         if self.eeprom.flag(21) and self.plant.switches():
             self.state = "Alarm"
-            yield from self._print("[MSG:Check Limits]")
+            yield from self.print_line("[MSG:Check Limits]")
         if self.state in ("Alarm", "Sleep"):
             self.state = "Alarm"
-            yield from self._print("[MSG:'$H'|'$X' to unlock]")
+            yield from self.print_line("[MSG:'$H'|'$X' to unlock]")
         else:
             self.state = "Idle"
-            yield from self._startup_lines()
+            yield from self.startup_lines()
         line, skipping = "", ""
         while True:
             while self._rx:
                 char = chr(self._rx.popleft())
                 if char in "\r\n":
-                    yield from self._realtime()
-                    if self._abort:
+                    yield from self.realtime()
+                    if self.aborted:
                         return
                     yield from self._handle(
                         "" if skipping == "over" else line, skipping
@@ -277,10 +285,10 @@ class GrblBoard:
                     else:
                         line += char.upper()
             self._auto_start()
-            yield from self._realtime()
-            if self._abort:
+            yield from self.realtime()
+            if self.aborted:
                 return
-            yield math.inf if not self._flags and not self._rx else self.now_s
+            yield math.inf if not self.flags and not self._rx else self.now_s
 
     def _handle(self, line: str, skipping: str) -> Task:
         code = 0
@@ -292,24 +300,25 @@ class GrblBoard:
             elif line and self.state in ("Alarm", "Jog"):
                 code = 9
             elif line:
-                yield from self._run(read_line(line, self.modal, jog=False))
+                yield from self.run_order(read_line(line, self.modal, jog=False))
         except GcodeError as error:
             code = error.code
-        yield from self._print(f"error:{code}" if code else "ok")
+        yield from self.print_line(f"error:{code}" if code else "ok")
 
-    def _startup_lines(self) -> Task:
+    def startup_lines(self) -> Task:
+        """Run ``$N0`` and ``$N1`` and echo them."""
         for text in self.eeprom.startup:
             if text:
-                yield from self._run(read_line(text, self.modal, jog=False))
-                yield from self._print(f">{text}:ok")
+                yield from self.run_order(read_line(text, self.modal, jog=False))
+                yield from self.print_line(f">{text}:ok")
 
-    def _print(self, text: str) -> Task:
+    def print_line(self, text: str) -> Task:
         """Print a line; a full transmit buffer holds the firmware up."""
         self.send(text.encode("ascii") + b"\r\n")
         while self._tx_free_s > self.now_s + _TX_BYTES * _BYTE_S:
             yield self._tx_free_s - _TX_BYTES * _BYTE_S
 
-    def _pause(self, duration_s: float) -> Task:
+    def pause(self, duration_s: float) -> Task:
         """Wait without looking at any flag."""
         end_s = self.now_s + duration_s
         while self.now_s < end_s:
@@ -317,44 +326,45 @@ class GrblBoard:
 
     # --- flags are looked at here, and nowhere else --------------------------------
 
-    def _realtime(self) -> Task:
+    def realtime(self) -> Task:
+        """Look at the flags; stay here while suspended."""
         yield from self._flag_pass()
         if self.state == "Sleep" and self._suspended:
-            yield from self._print("[MSG:Sleeping]")
-        while self._suspended and not self._abort:
-            yield math.inf if not self._flags and not self._alarm else self.now_s
+            yield from self.print_line("[MSG:Sleeping]")
+        while self._suspended and not self.aborted:
+            yield math.inf if not self.flags and not self.alarm else self.now_s
             yield from self._flag_pass()
 
     def _flag_pass(self) -> Task:
-        if self._alarm:
+        if self.alarm:
             yield from self._enter_alarm()
-        if "reset" in self._flags:
-            self._abort = True
+        if "reset" in self.flags:
+            self.aborted = True
             return
-        if "status" in self._flags:
-            self._flags.discard("status")
-            yield from self._print(status_report(self))
-        if self._flags & {"hold", "cancel", "sleep"}:
+        if "status" in self.flags:
+            self.flags.discard("status")
+            yield from self.print_line(status_report(self))
+        if self.flags & {"hold", "cancel", "sleep"}:
             self._take_hold()
-        if "start" in self._flags:
+        if "start" in self.flags:
             self._take_start()
-        if "cycle stop" in self._flags:
+        if "cycle stop" in self.flags:
             self._take_cycle_stop()
 
     def _enter_alarm(self) -> Task:
-        code, self._alarm = self._alarm, 0
+        code, self.alarm = self.alarm, 0
         self.state = "Alarm"
-        yield from self._print(f"ALARM:{code}")
-        yield from self._pause(0.5)
+        yield from self.print_line(f"ALARM:{code}")
+        yield from self.pause(0.5)
         if code in (1, 2):
-            yield from self._print("[MSG:Reset to continue]")
-            self._flags.discard("reset")
-            while "reset" not in self._flags:
+            yield from self.print_line("[MSG:Reset to continue]")
+            self.flags.discard("reset")
+            while "reset" not in self.flags:
                 yield math.inf
 
     def _take_hold(self) -> None:
-        flags = self._flags & {"hold", "cancel", "sleep"}
-        self._flags -= flags
+        flags = self.flags & {"hold", "cancel", "sleep"}
+        self.flags -= flags
         if self.state in ("Alarm", "Check"):
             if "sleep" in flags:
                 self._suspended = self._held = True
@@ -374,7 +384,7 @@ class GrblBoard:
             self.counters.overrides = 0  # spindle and coolant are switched off
 
     def _take_start(self) -> None:
-        self._flags.discard("start")
+        self.flags.discard("start")
         if not (self.state == "Idle" or (self.state == "Hold" and self._held)):
             return
         self._suspended = self._held = self._stopping = False
@@ -385,7 +395,7 @@ class GrblBoard:
             self.state = "Idle"
 
     def _take_cycle_stop(self) -> None:
-        self._flags.discard("cycle stop")
+        self.flags.discard("cycle stop")
         waits = self.state in ("Hold", "Sleep")
         if waits and not self._soft_limit and not self._cancelling:
             self._held = True
@@ -393,7 +403,7 @@ class GrblBoard:
             return
         if self._cancelling:
             self.mover.kill()
-            self._planned = list(self.position)
+            self.planned = list(self.position)
         self._suspended = self._cancelling = self._stopping = False
         self.state = "Idle"
 
@@ -411,17 +421,17 @@ class GrblBoard:
 
     def _auto_start(self) -> None:
         if self.mover.blocks and self.state == "Idle":
-            self._flags.add("start")
+            self.flags.add("start")
 
     def _wait_until_done(self) -> Task:
         self._auto_start()
         while True:
-            yield from self._realtime()
-            if self._abort or not (self.mover.blocks or self.state == "Run"):
+            yield from self.realtime()
+            if self.aborted or not (self.mover.blocks or self.state == "Run"):
                 return
-            yield math.inf if not self._flags else self.now_s
+            yield math.inf if not self.flags else self.now_s
 
-    def _run(self, order: Order, *, jog: bool = False) -> Task:
+    def run_order(self, order: Order, *, jog: bool = False) -> Task:
         """Carry out one checked line."""
         if not jog:
             if order.modal.system != self.modal.system:
@@ -429,7 +439,7 @@ class GrblBoard:
             self.modal = order.modal
         if order.kind == "dwell" and self.state != "Check":
             yield from self._wait_until_done()
-            if not self._abort:
+            if not self.aborted:
                 yield from self._dwell(order.seconds)
         elif order.kind in ("G92", "G92.1", "G10"):
             yield from self._wait_until_done()
@@ -446,19 +456,19 @@ class GrblBoard:
             yield from self._line(target, order, jog=jog)
         elif order.kind == "end":
             self.modal = Modal(units=self.modal.units, tool=self.modal.tool)
-            yield from self._print("[MSG:Pgm End]")
+            yield from self.print_line("[MSG:Pgm End]")
 
     def _dwell(self, duration_s: float) -> Task:
         end_s = self.now_s + duration_s
-        while self.now_s < end_s and not self._abort:
+        while self.now_s < end_s and not self.aborted:
             yield min(end_s, self.now_s + 0.05)
-            yield from self._realtime()
+            yield from self.realtime()
 
     def planned_mm(self) -> list[float]:
         """Return where the queued motions end, in machine mm."""
         return [
             s / k if (k := self.eeprom[100 + axis]) else 0.0
-            for axis, s in enumerate(self._planned)
+            for axis, s in enumerate(self.planned)
         ]
 
     def offset_mm(self) -> list[float]:
@@ -506,8 +516,8 @@ class GrblBoard:
         if self.state == "Check":
             return
         while True:
-            yield from self._realtime()
-            if self._abort:
+            yield from self.realtime()
+            if self.aborted:
                 return
             if self.mover.free_blocks > 0:
                 break
@@ -522,7 +532,7 @@ class GrblBoard:
     def _plan(self, target: list[float], feed_mm_min: float) -> None:
         per_mm = [self.eeprom[100 + axis] for axis in range(3)]
         steps = [round(place * k) for place, k in zip(target, per_mm, strict=True)]
-        delta = tuple(a - b for a, b in zip(steps, self._planned, strict=True))
+        delta = tuple(a - b for a, b in zip(steps, self.planned, strict=True))
         if not any(delta):
             return
         moves = [d / k if k else 0.0 for d, k in zip(delta, per_mm, strict=True)]
@@ -543,7 +553,7 @@ class GrblBoard:
         )
         self.mover.add(block)
         self._last_direction = [move / length for move in moves]
-        self._planned = steps
+        self.planned = steps
 
     def _junction(self, moves: list[float], length_mm: float) -> float:
         """Speed through the corner: straight on is free, a turn back is a stop."""
@@ -562,15 +572,15 @@ class GrblBoard:
     def _soft_limit_alarm(self) -> Task:
         self._soft_limit = True
         if self.state == "Run":
-            self._flags.add("hold")
+            self.flags.add("hold")
             while self.state != "Idle":
-                yield from self._realtime()
-                if self._abort:
+                yield from self.realtime()
+                if self.aborted:
                     return
-                yield math.inf if not self._flags else self.now_s
-        self._reset_from_anywhere()
-        self._alarm = 2
-        yield from self._realtime()
+                yield math.inf if not self.flags else self.now_s
+        self.reset_from_anywhere()
+        self.alarm = 2
+        yield from self.realtime()
 
     # --- $ lines -------------------------------------------------------------------
 

@@ -94,7 +94,7 @@ class Serial(SerialBase):
 
     def read(self, size: int = 1) -> bytes:
         """Read up to `size` bytes, waiting as long as the timeout says."""
-        left_s = self._timeout if self._timeout is not None else 1e9
+        left_s = self.timeout if self.timeout is not None else 1e9
         while True:
             self._catch_up()
             if self._pending or left_s <= 0.0:

@@ -157,7 +157,7 @@ class Replay:
     def _reached(self, kind: str, place: float) -> bool:
         mover = self.board.mover
         here = self.board.position[0] / 250.0 + self.shift
-        left = self.board._planned[0] / 250.0 + self.shift - here
+        left = self.board.planned[0] / 250.0 + self.shift - here
         if not mover.running or not left:
             return True
         sign = 1.0 if left > 0.0 else -1.0
