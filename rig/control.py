@@ -42,13 +42,19 @@ class RunControl:
         else:
             self._asked.set()
 
-    def wait_while_paused(self, report: Report) -> bool:
-        """Wait until nobody asks for a pause; return whether there was one."""
+    def wait_while_paused(
+        self, report: Report, *, check: Callable[[], None] = lambda: None
+    ) -> bool:
+        """Wait until nobody asks for a pause; return whether there was one.
+
+        `check` is called all the while; it may raise, to end the wait.
+        """
         if not self.is_paused:
             return False
         report("\apaused: press p again, or remove the file named pause, to go on")
         tick = threading.Event()
         while self.is_paused:
+            check()
             tick.wait(_POLL_S)
         report("going on")
         return True

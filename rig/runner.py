@@ -182,13 +182,16 @@ class _Session:
 
     def _take_step(self, index: int, gap_mm: float) -> Record:
         devices, plan = self.devices, self.plan
-        was_paused = self.control.wait_while_paused(self.report)
+        was_paused = self._pause()
         move = devices.stage.goto_gap(gap_mm)
         devices.camera.at_step(index, gap_mm)
-        was_paused = self.control.wait_while_paused(self.report) or was_paused
-        settled = settle(devices.camera, devices.clock, plan.settle)
+        was_paused = self._pause() or was_paused
+        settled = settle(
+            devices.camera, devices.clock, plan.settle, check=self._require_no_stop
+        )
         flux = devices.meter.read_flux(plan.model.flux.samples, gap_mm=gap_mm)
         frame = grab_median(devices.camera, devices.clock, plan.model.photograph.frames)
+        self._require_no_stop()
         self._require_standing(move)
         level = brightness(frame.image)
         if self.reference_brightness is None:
@@ -221,6 +224,14 @@ class _Session:
         return self.folder.commit_step(
             record, {image_name(index): encode_png(frame.image)}
         )
+
+    def _pause(self) -> bool:
+        return self.control.wait_while_paused(self.report, check=self._require_no_stop)
+
+    def _require_no_stop(self) -> None:
+        """End the run if another terminal asked for it while the stage stands."""
+        if self.devices.stage.stop_requested():
+            raise StoppedError("the run was stopped by magbend rig stop")
 
     def _require_standing(self, move: MoveRecord) -> None:
         """Refuse a photograph during which the stage moved, or lost itself."""

@@ -12,6 +12,7 @@ a slow swing moves little between neighbours, most of all at its turning points.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -117,7 +118,13 @@ class StillnessJudge:
         return self._still >= config.frames - 1 and window_s >= config.window_s
 
 
-def settle(camera: Camera, clock: Clock, config: SettleConfig) -> Settled:
+def settle(
+    camera: Camera,
+    clock: Clock,
+    config: SettleConfig,
+    *,
+    check: Callable[[], None] = lambda: None,
+) -> Settled:
     """Wait until the rod is still, or until the time is up.
 
     Parameters
@@ -128,6 +135,8 @@ def settle(camera: Camera, clock: Clock, config: SettleConfig) -> Settled:
         What waits; called right after the stage arrived.
     config : SettleConfig
         Fixed time, threshold, number of pictures, time-out.
+    check : callable
+        Called before each picture; it may raise, to end the wait.
 
     Returns
     -------
@@ -145,6 +154,7 @@ def settle(camera: Camera, clock: Clock, config: SettleConfig) -> Settled:
     after_s = clock.monotonic_s()
     frames = 0
     while True:
+        check()
         frame = camera.grab_after(after_s)
         frames += 1
         is_still = judge.is_still(frame)

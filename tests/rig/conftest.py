@@ -70,6 +70,7 @@ class FakeStage:
     clock: SteppedClock
     machine_mm: float = -50.0
     position_state: str = "unknown"
+    is_stop_asked: bool = False
     calls: list[str] = field(default_factory=list)
     before: Callable[[str], None] = lambda call: None
     limits: StageLimits = field(
@@ -113,6 +114,12 @@ class FakeStage:
             machine_mm=self.machine_mm,
             position_state=self.position_state,
         )
+
+    def stop_requested(self) -> bool:
+        return self.is_stop_asked
+
+    def request_stop(self) -> None:
+        self.is_stop_asked = True
 
     def hold(self) -> None:
         self._log("hold")

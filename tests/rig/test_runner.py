@@ -7,6 +7,7 @@ import cv2
 import pytest
 
 from magbend.core.errors import CameraError, StoreError
+from magbend.rig.control import RunControl
 from magbend.rig.read_run import read_run
 from magbend.rig.runner import run
 from magbend.rig.stage import InterlockError, LinkLostError
@@ -93,6 +94,24 @@ def test_ctrl_c_in_each_phase_holds_and_ends_as_abort(
     assert read_run(out).status == "abort"
     assert verify_run(out) == []
     assert len(read_run(out).steps) == (1 if phase == "move" else 0)
+
+
+@pytest.mark.parametrize("at", ["settle", "pause"])
+def test_rig_stop_ends_a_run_whose_stage_stands(bench, tmp_path, at: str) -> None:
+    control = RunControl()
+    plain = bench.camera.at_step
+
+    def at_step(index: int, gap_mm: float) -> None:
+        plain(index, gap_mm)
+        bench.raw.request_stop()
+        if at == "pause":
+            control.toggle_pause()
+
+    bench.camera.at_step = at_step
+    summary = run(bench.plan, bench.devices, tmp_path / "out", control=control)
+    assert summary.status == "abort"
+    assert "magbend rig stop" in summary.reason
+    assert bench.clock.monotonic_s() < 30.0
 
 
 def test_a_second_ctrl_c_stops_at_once(bench, tmp_path: Path) -> None:
