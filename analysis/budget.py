@@ -18,6 +18,7 @@ from ..core.errors import MagbendError
 from ..core.specimen import Specimen
 from .compare import Comparison, RunComparison, usable_flux
 from .fit import FitResult
+from .fit_problem import Nuisance
 
 ASSUMED = {
     "side_percent": 1.0,
@@ -103,6 +104,11 @@ def _inputs(
         name: np.array([result.dx_mm[-1, k], result.dy_mm[-1, k]])
         for k, name in enumerate(names)
     }
+    if "clamp_angle_deg" in tips and last.solution and last.solution.centreline:
+        # The measured frame leaves the clamp along the rod and turns with it: what is
+        # left is the field seen from another direction.
+        x_mm, y_mm = last.solution.centreline.tip_mm
+        tips["clamp_angle_deg"] -= math.radians(1.0) * np.array([-y_mm, x_mm])
     lines = []
     for parameters, sds, cause, taken in causes:
         moves = [tips[n] * sd for n, sd in zip(parameters, sds, strict=True)]
@@ -248,7 +254,13 @@ def _measurement(last: Comparison) -> list[BudgetLine]:
             tip_um=10.0 * scale * tip_mm,
             taken=f"{scale:g} %, assumed",
             kind="measurement",
-        )
+        ),
+        BudgetLine(
+            cause="frame at the clamp",
+            tip_um=1e3 * math.radians(Nuisance().frame_angle_deg) * tip_mm,
+            taken=f"{Nuisance().frame_angle_deg:g} deg, twin bench",
+            kind="measurement",
+        ),
     ]
     sigma = float(frame.sigma_mm[-1]) if len(frame.sigma_mm) else math.nan
     if math.isfinite(sigma):

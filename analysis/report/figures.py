@@ -58,8 +58,14 @@ def shapes_figure(run: RunComparison) -> Figure:
         axes.set_ylabel("y (mm)")
         axes.set_aspect("equal", adjustable="datalim")
         axes.margins(x=0.12, y=0.1)
-        axes.legend(loc="best")
+        axes.legend(loc="upper left" if _bends_up(run) else "lower left")
     return figure
+
+
+def _bends_up(run: RunComparison) -> bool:
+    tips = [c.frame.centreline.tip_mm[1] for c in run.of("magnet")
+            if c.frame and c.frame.centreline]  # fmt: skip
+    return sum(tips) >= 0.0
 
 
 def _first_ok(run: RunComparison) -> Comparison | None:
@@ -263,7 +269,7 @@ def paper_figure(by_number: dict[int, RunComparison]) -> Figure:
     fluxes = [c.step.flux_mT for c in done if math.isfinite(c.step.flux_mT)] or [0, 1]
     norm = mpl.colors.Normalize(min(fluxes) * 0.85, max(fluxes) * 1.15)
     with drawing():
-        figure = new_figure(78.0)
+        figure = new_figure(78.0, gap=0.06)
         panels = figure.subplots(1, 3, sharex=True, sharey=True)
         for axes, (title, numbers, names) in zip(panels, PANELS, strict=True):
             for number, name, dash in zip(numbers, names, dashes, strict=True):
@@ -277,8 +283,8 @@ def paper_figure(by_number: dict[int, RunComparison]) -> Figure:
             axes.legend(loc="upper left", fontsize=7)
         panels[0].set_ylabel("y (mm)")
         scale = mpl.cm.ScalarMappable(norm=norm, cmap=colours)
-        bar = figure.colorbar(scale, ax=panels, shrink=0.8, pad=0.01)
-        bar.set_label("flux density (mT); points measured, lines simulated (magnet)")
+        bar = figure.colorbar(scale, ax=panels, shrink=0.9, pad=0.015, aspect=28)
+        bar.set_label("flux density read (mT)")
     return figure
 
 

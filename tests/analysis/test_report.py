@@ -183,6 +183,15 @@ def test_budget_is_sorted_and_true(tmp_path: Path) -> None:
     assert gap.tip_um == pytest.approx(moved_um, rel=1e-3)
 
 
+def test_turning_the_clamp_counts_without_the_frame_that_turns_along(
+    tmp_path: Path,
+) -> None:
+    lines = {line.cause: line for line in tip_budget(compared(tmp_path / "a"))}
+    assert lines["direction of the clamp"].tip_um < 60.0
+    # 0.3 deg of a rod of 30 mm
+    assert lines["frame at the clamp"].tip_um == pytest.approx(157.0, rel=0.02)
+
+
 @pytest.mark.parametrize(
     ("value", "text"),
     [(float("nan"), "–"), (None, "–"), (float("inf"), "∞"), (-0.0001, "0.000")],
