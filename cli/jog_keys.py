@@ -6,7 +6,7 @@ import contextlib
 import queue
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import typer
@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from ..rig.gap_stage import GapStage
 
 STEPS_MM = {"1": 0.1, "2": 0.5, "3": 1.0, "4": 5.0, "5": 10.0}
-FARTHER = {"up", "right", "+", "k", "l"}
-NEARER = {"down", "left", "-", "j", "h"}
+FARTHER = {"up", "right", "+", "k"}
+NEARER = {"down", "left", "-", "j"}
 _HELP = (
     "up/right farther, down/left nearer, 1-5 step 0.1 0.5 1 5 10 mm, H home, "
     "space stop, q quit"
@@ -66,7 +66,7 @@ def _act(stage: GapStage, key: str, step_mm: float, keys: queue.Queue[str]) -> N
             with _space_stops(stage, keys):
                 stage.goto_gap(here_mm + sign * step_mm, moved=_live(step_mm))
     except KeyboardInterrupt:
-        typer.echo("\rstopped; the position was kept" + " " * 20)
+        typer.echo(f"\rstopped; the position is {stage.position_state}" + " " * 20)
     except RigError as error:
         typer.echo(f"\r{error}" + " " * 10)
 
@@ -101,7 +101,7 @@ def _show(stage: GapStage, step_mm: float) -> None:
     )
 
 
-def _live(step_mm: float):  # type: ignore[no-untyped-def]
+def _live(step_mm: float) -> Callable[[float], None]:
     def show(gap_mm: float) -> None:
         typer.echo(f"\rgap {gap_mm:8.3f} mm  moving  step {step_mm:g} mm   ", nl=False)
 

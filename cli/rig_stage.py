@@ -91,7 +91,7 @@ def home(rig: RigOption = RIG, port: PortOption = None, log: LogOption = None) -
     """Find the reference of the stage by its switches (a stock build homes Z, X, Y)."""
     with _connected(rig, port, log) as stage:
         typer.echo("homing; Ctrl-C stops it at once", err=True)
-        with _told_how_to_go_on("home it again"):
+        with _told_how_to_go_on(stage):
             stage.home()
         typer.echo(_line(_facts(stage)))
 
@@ -117,7 +117,7 @@ def goto(
         if home_first and stage.position_state != "homed":
             typer.echo("homing; Ctrl-C stops it at once", err=True)
             stage.home()
-        with _told_how_to_go_on("the position was kept"):
+        with _told_how_to_go_on(stage):
             record = stage.goto_gap(gap_mm, feed_mm_min=feed_mm_min, moved=_ticker())
         if as_json:
             print_json(dataclasses.asdict(record))
@@ -235,12 +235,14 @@ def _connected(rig: Path, port: str | None, log: Path | None) -> Iterator[GapSta
 
 
 @contextlib.contextmanager
-def _told_how_to_go_on(what: str) -> Iterator[None]:
+def _told_how_to_go_on(stage: GapStage) -> Iterator[None]:
     from ..core.errors import RigError
 
     try:
         yield
     except KeyboardInterrupt:
+        kept = stage.position_state == "homed"
+        what = "the position was kept" if kept else "home it (magbend rig home)"
         raise RigError(f"stopped by Ctrl-C; {what}") from None
 
 
