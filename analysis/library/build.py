@@ -311,7 +311,7 @@ def _connect(address: str) -> Any:
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
-        return Client(address, timeout=10, set_as_default=False)
+        return Client(address, timeout=5, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         reason = " ".join(str(error).split())[:160] or type(error).__name__
         raise StoreError(
@@ -330,7 +330,7 @@ def _on_cluster(
     futures = client.map(
         _task, missing, data=data, out=str(out.resolve()), pure=False, retries=2
     )
-    for future in completed(futures):
+    for future in completed(futures, loop=client.loop):
         if future.status != "finished":
             raise StoreError(
                 f"a worker failed on a partition: {future.exception()}; the finished "
