@@ -72,6 +72,42 @@ _HOME = {
     "verify_run": "verify",
 }
 
+__all__ = [
+    "AlarmError",
+    "Clock",
+    "Devices",
+    "GapStage",
+    "GapStatus",
+    "GrblStage",
+    "InterlockError",
+    "LimitsConfig",
+    "LinkLostError",
+    "MarlinStage",
+    "MoveRecord",
+    "Plan",
+    "PortInfo",
+    "PositionLostError",
+    "RigModel",
+    "Run",
+    "RunSummary",
+    "ScaledClock",
+    "Stage",
+    "StageConfig",
+    "StageTimeoutError",
+    "SteppedClock",
+    "StoppedError",
+    "SystemClock",
+    "WireLog",
+    "list_ports",
+    "make_stage",
+    "open_devices",
+    "read_plan",
+    "read_rig",
+    "read_run",
+    "run",
+    "verify_run",
+]
+
 
 def __getattr__(name: str) -> object:
     """Load a public name from the module that holds it."""
@@ -85,4 +121,4 @@ def __getattr__(name: str) -> object:
 
 def __dir__() -> list[str]:
     """List the public names, loaded or not."""
-    return sorted([*_HOME, "read_run"])
+    return sorted(__all__)
