@@ -383,7 +383,7 @@ def _settings(
     from ..vision.calibration import Calibration
 
     known = None if calibration is None else Calibration.load(calibration)
-    given = {
+    given: dict[str, Any] = {
         name: finite(value, f"--{name.replace('_', '-')}", "mm")
         for name, value in lengths.items()
         if value is not None
