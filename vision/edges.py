@@ -11,6 +11,7 @@ mean of the two levels; that term is kept.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -129,7 +130,7 @@ def find_edges(
         half = strip[:, count::-1] if side == 0 else strip[:, count:]
         half = np.ascontiguousarray(half)
         levels = np.empty((3, len(points)))
-        _levels(half, expected, near, window, levels)
+        _levels(half, expected, near, window, blur, levels)
         for row in levels:
             row[:] = _running_mean(row, smooth)
         _cross(half, expected, levels, reach, blur, out[side])
@@ -257,7 +258,7 @@ def _sample(
 
 @njit(cache=True)
 def _levels(
-    half: Image, expected: Array, near: float, window: float, levels: Array
+    half: Image, expected: Array, near: float, window: float, blur: float, levels: Array
 ) -> None:
     """Inner level, outer level at the expected edge, and slope of the outer one."""
     count, columns = half.shape
@@ -279,6 +280,9 @@ def _levels(
         n, st, sg, stt, stg = 0, 0.0, 0.0, 0.0, 0.0
         for k in range(first, last + 1):
             t, g = k * step - edge, half[i, k]
+            # The blurred edge's own tail must not count as shade.
+            share = 0.5 * (1.0 + math.erf(t / (1.4142135623730951 * blur)))
+            g = (g - (1.0 - share) * levels[0, i]) / share
             n += 1
             st += t
             sg += g
