@@ -22,11 +22,11 @@ from .grbl_protocol import (
     FEED_HOLD,
     SOFT_RESET,
     Report,
-    Triple,
     alarm_text,
     jog_line,
 )
 from .grbl_session import CommandRefusedError, GrblSession
+from .grbl_trust import PositionTrust
 from .link import Link, WireLog
 from .ports import resolve_port
 from .presence import Presence
@@ -76,15 +76,13 @@ class GrblStage:
         self._presence: Presence | None = None
         self._identity: StageIdentity | None = None
         self._limits: StageLimits | None = None
-        self._position: PositionState = "unknown"
-        self._restarts = 0
-        self._standing_at: Triple | None = None
+        self._trust = PositionTrust(config.axis)
         self._undisturbed = False
 
     @property
     def position_state(self) -> PositionState:
         """How far the position can be trusted."""
-        return self._position
+        return self._trust.state
 
     @property
     def identity(self) -> StageIdentity:
@@ -111,7 +109,7 @@ class GrblStage:
         """
         config = self._config
         self._disconnect()
-        self._position = "unknown"
+        self._trust.lose()
         port = resolve_port(config.port)
         link = Link(
             port, baud=config.baud, clock=self._clock, log=self._log, dtr=config.dtr
@@ -133,7 +131,7 @@ class GrblStage:
             self._disconnect()
             raise
         self._session = session
-        self._restarts = session.restarts
+        self._trust.watch(session)
         self._limits = grbl_audit.limits_of(found.settings, config)
         self._identity = StageIdentity(
             driver="grbl",
@@ -145,9 +143,13 @@ class GrblStage:
         )
         self._undisturbed = found.undisturbed
         left_at = presence.recall()
-        self._standing_at = session.machine()
-        if left_at and found.undisturbed and self._is_at(left_at):
-            self._position = "homed"
+        step_mm = self._limits.step_mm
+        if (
+            left_at
+            and found.undisturbed
+            and self._trust.is_at(session, left_at, step_mm)
+        ):
+            self._trust.confirm(session)
 
     def home(self) -> None:
         """Run the homing cycle of the board and wait for its end.
@@ -169,7 +171,7 @@ class GrblStage:
         limit_s = self._config.home_timeout_s or self._config.busy_factor * (
             grbl_audit.homing_time_s(self.identity.settings)
         )
-        self._position, self._standing_at = "unknown", None
+        self._trust.lose()
         with self._stop_if_interrupted():
             session.drain()
             self._require_link().write(self._config.home_command.encode() + b"\n")
@@ -184,9 +186,7 @@ class GrblStage:
         if report.state != "idle":
             raise StageError(f"after homing the stage is in {report.state}, not idle")
         session.alarm = None
-        self._restarts = session.restarts
-        self._standing_at = session.machine()
-        self._position = "homed"
+        self._trust.confirm(session)
 
     def assume_homed(self, machine_mm: float) -> None:
         """Take the operator's word that the board's count is right.
@@ -206,13 +206,12 @@ class GrblStage:
             raise StageError(
                 f"the board counts {here:.3f} mm, not {machine_mm:.3f} mm: it moved"
             )
-        if self._config.homing == "switches" and self._position != "homed":
+        if self._config.homing == "switches" and self._trust.state != "homed":
             raise PositionLostError(
-                f"the position of the stage is {self._position}; it has switches: "
+                f"the position of the stage is {self._trust.state}; it has switches: "
                 "home it first (magbend rig home)"
             )
-        self._standing_at = session.machine()
-        self._position = "homed"
+        self._trust.confirm(session)
 
     def move_to(
         self, machine_mm: float, *, feed_mm_min: float, moved: Moved = unheard
@@ -231,7 +230,7 @@ class GrblStage:
         session = self._require_session()
         self._check_travel(machine_mm)
         self._make_ready(session)
-        self._require_homed(session)
+        self._trust.require(session, self.limits.step_mm)
         here = self._machine_mm()
         if here is None:
             raise PositionLostError("the stage does not report its position; home it")
@@ -248,14 +247,14 @@ class GrblStage:
         """Ask the board; no answer is the state ``silent``."""
         session = self._require_session()
         report = session.ask()
-        self._notice_restart(session)
+        self._trust.note(session)
         code = session.alarm
         state = report.state if report else "silent" if code is None else "alarm"
         return StageStatus(
             state=state,  # type: ignore[arg-type]
             substate=report.substate if report else None,
             machine_mm=self._machine_mm() if report or session.deaf else None,
-            position_state=self._position,
+            position_state=self._trust.state,
             feed_mm_min=report.feed if report else 0.0,
             alarm=code,
             trouble=session.alarm_error(code) if code is not None else None,
@@ -283,8 +282,13 @@ class GrblStage:
         """
         session = self._require_session()
         session.realtime(FEED_HOLD)
-        if self._presence:
-            self._presence.clear_stop()
+        try:
+            self._hold(session)
+        finally:
+            if self._presence:
+                self._presence.clear_stop()
+
+    def _hold(self, session: GrblSession) -> None:
         feed = self.limits.max_feed_mm_min / 60.0
         limit_s = _MARGIN_S + self._config.busy_factor * (
             feed / self.limits.acceleration_mm_s2
@@ -293,12 +297,11 @@ class GrblStage:
         if report is not None:
             if report.state == "hold" or not session.in_step:
                 self._reset_standing(session)
-            self._standing_at = session.machine()
+            self._trust.stands(session)
             return
-        moved = not session.deaf
+        if not session.deaf:
+            self._trust.doubt()
         session.reset()
-        if moved and self._position == "homed":
-            self._position = "unverified"
         raise StageTimeoutError(
             "the stage did not come to a stop that it could report; it was reset; "
             "home it (magbend rig home)"
@@ -308,8 +311,8 @@ class GrblStage:
         """Soft-reset at once; what was moving has lost steps."""
         session = self._require_session()
         moving = session.report is None or not stands(session.report)
-        if moving and self._position == "homed":
-            self._position = "unverified"
+        if moving:
+            self._trust.doubt()
         if self._presence:
             self._presence.clear_stop()
         self._reset_standing(session)
@@ -334,18 +337,18 @@ class GrblStage:
             self.hold()
         elif not session.reset():
             raise StageTimeoutError("the stage does not answer a reset; cut its power")
-        self._notice_restart(session)
+        self._trust.note(session)
 
     def _reconnect(self) -> None:
         """Open the port again; what had been known of the position is unverified."""
-        before = self._position
+        before = self._trust.state
         try:
             self.connect()
         except StageError:
-            self._position = before
+            self._trust.state = before
             raise
         trusted = before != "unknown" and self._undisturbed
-        self._position = "unverified" if trusted else "unknown"
+        self._trust.state = "unverified" if trusted else "unknown"
 
     def unlock(self) -> None:
         """Send ``$X``; the position is ``homed`` only if the alarm kept it."""
@@ -356,8 +359,8 @@ class GrblStage:
         session.command("$X")
         session.alarm, session.locked_message = None, False
         kept = code is not None and alarm_text(code).position_kept
-        if self._position == "homed" and not kept:
-            self._position = "unverified"
+        if not kept:
+            self._trust.doubt()
 
     def close(self) -> None:
         """Let go of the port; where a homed stage stands is remembered."""
@@ -365,10 +368,10 @@ class GrblStage:
         if session and presence and self._link and self._link.is_open:
             with contextlib.suppress(StageError):
                 report = session.ask()
-                self._notice_restart(session)
+                self._trust.note(session)
                 machine = session.machine()
                 idle = report is not None and report.state == "idle"
-                if self._position == "homed" and idle and machine:
+                if self._trust.state == "homed" and idle and machine:
                     presence.remember(machine)
         self._disconnect()
 
@@ -408,26 +411,25 @@ class GrblStage:
                     "it is set to; nothing moved"
                 ) from None
             raise
-        except AlarmError as error:
-            self._position = "homed" if error.position_kept else "unknown"
+        except AlarmError:
+            self._trust.note(session)
             session.reset()
             raise
         except PositionLostError:
-            self._position, self._restarts = "unknown", session.restarts
+            self._trust.note(session)
             raise
         except LinkLostError:
-            self._position = "unverified"
+            self._trust.doubt()
             raise
         except StageTimeoutError as error:
             self._give_up(error)
-        self._standing_at = session.machine()
+        self._trust.stands(session)
 
     def _give_up(self, error: StageTimeoutError) -> None:
         """Bring the stage to a stand after a timeout, and say so."""
         with contextlib.suppress(StageError):
             self.hold()
-        if self._position == "homed":
-            self._position = "unverified"
+        self._trust.doubt()
         session = self._session
         if session is not None and not session.in_step:
             with contextlib.suppress(StageError):
@@ -452,7 +454,7 @@ class GrblStage:
             yield
         except KeyboardInterrupt:
             session = self._require_session()
-            homing = session.report is not None and self._position == "unknown"
+            homing = session.report is not None and self._trust.state == "unknown"
             try:
                 if homing:
                     self.stop()
@@ -461,7 +463,7 @@ class GrblStage:
             except KeyboardInterrupt:
                 with contextlib.suppress(StageError):
                     session.realtime(SOFT_RESET)
-                self._position = "unverified"
+                self._trust.doubt()
             except StageError as error:
                 logger.warning("stage: %s", error)
             raise
@@ -469,15 +471,15 @@ class GrblStage:
     def _make_ready(self, session: GrblSession) -> None:
         """Bring the board to where it takes a line: standing, in step, not deaf."""
         report = self._wait_for_report(session)
-        self._notice_restart(session)
+        self._trust.note(session)
         stuck = report.state == "home"  # a running cycle answers no question
         if not (stands(report) or stuck):
             raise StageError(
                 f"the stage is in {report.state}; wait for it, or stop it first "
                 "(magbend rig stop)"
             )
-        if report.state == "sleep" and self._position == "homed":
-            self._position = "unverified"  # its motors had been off
+        if report.state == "sleep":
+            self._trust.doubt()  # its motors had been off
         waits = stuck or report.state in ("hold", "sleep")
         if waits or session.deaf or not session.in_step:
             self._reset_standing(session)
@@ -492,56 +494,15 @@ class GrblStage:
             if session.deaf:
                 session.reset()
         if session.reset() and session.report is not None:
-            if self._position == "homed":
-                self._position = "unverified"
+            self._trust.doubt()
             return session.report
         raise StageTimeoutError("the stage does not answer; look at cable and power")
 
     def _reset_standing(self, session: GrblSession) -> None:
         if not session.reset():
-            if self._position == "homed":
-                self._position = "unverified"
+            self._trust.doubt()
             raise StageTimeoutError("the stage does not answer a reset; cut its power")
-        self._distrust_after_alarm(session)
-
-    def _distrust_after_alarm(self, session: GrblSession) -> None:
-        alarm = session.alarm
-        if alarm is not None and not alarm_text(alarm).position_kept:
-            self._position = "unknown"
-
-    def _require_homed(self, session: GrblSession) -> None:
-        if session.report and session.report.state == "alarm":
-            code = session.alarm
-            if code is not None:
-                raise session.alarm_error(code)
-            raise PositionLostError(
-                "the board is locked (Alarm); home it (magbend rig home)"
-            )
-        if self._position == "homed" and self._standing_at is not None:
-            now = session.machine()
-            if now is not None and not self._is_at(self._standing_at):
-                self._position = "unknown"
-                raise PositionLostError(
-                    f"the board counts {now[self._axis]:.3f} mm where it had stood at "
-                    f"{self._standing_at[self._axis]:.3f} mm: it restarted, or another "
-                    "program moved it; home it (magbend rig home)"
-                )
-        if self._position != "homed":
-            raise PositionLostError(
-                f"the position of the stage is {self._position}; home it first "
-                "(magbend rig home), then move"
-            )
-        if session.report and self._config.axis in session.report.pins:
-            raise PositionLostError(
-                f"the limit switch of {self._config.axis} is closed (Pn:"
-                f"{session.report.pins}); free it and home the stage"
-            )
-
-    def _notice_restart(self, session: GrblSession) -> None:
-        if session.restarts != self._restarts:
-            self._restarts = session.restarts
-            self._position, self._standing_at = "unknown", None
-        self._distrust_after_alarm(session)
+        self._trust.note(session)
 
     def _check_travel(self, machine_mm: float) -> None:
         travel = self.limits.travel_mm
@@ -555,13 +516,6 @@ class GrblStage:
     def _machine_mm(self) -> float | None:
         machine = self._session.machine() if self._session else None
         return machine[self._axis] if machine and len(machine) > self._axis else None
-
-    def _is_at(self, place: Triple) -> bool:
-        now = self._session.machine() if self._session else None
-        if now is None or len(now) != len(place):
-            return False
-        slack = 1.5 * self.limits.step_mm
-        return all(abs(a - b) <= slack for a, b in zip(now, place, strict=True))
 
     def _require_session(self) -> GrblSession:
         if self._session is None:

@@ -19,10 +19,11 @@ import math
 from collections import deque
 from collections.abc import Callable, Generator
 
+from .board_motion import outside, plan, set_offset, target_of
 from .board_report import Counters, status_report
 from .gcode import GcodeError, Modal, Order, read_line
 from .grbl_settings import OFFSET_ROWS, Eeprom
-from .motion import Block, Mover
+from .motion import Mover
 from .plant import Plant
 
 Task = Generator[float, None, None]
@@ -81,6 +82,7 @@ class GrblBoard:
         self.homing = False
         self.flags: set[str] = set()
         self._rx: deque[int] = deque()
+        self.direction = [0.0, 0.0, 0.0]
         self._wake_s = 0.0
         self._power_up()
 
@@ -443,15 +445,15 @@ class GrblBoard:
                 yield from self._dwell(order.seconds)
         elif order.kind in ("G92", "G92.1", "G10"):
             yield from self._wait_until_done()
-            self._set_offset(order)
+            set_offset(self, order)
         elif order.kind in ("G28.1", "G30.1"):
             self.eeprom.offsets[order.kind[:3]] = self.planned_mm()
         elif order.kind in ("G28", "G30"):
             target = list(self.eeprom.offsets[order.kind])
             yield from self._line(target, order)
         elif order.kind == "move":
-            target = self._target(order)
-            if jog and self.eeprom.flag(20) and self._outside(target):
+            target = target_of(self, order)
+            if jog and self.eeprom.flag(20) and outside(self, target):
                 raise GcodeError(15)
             yield from self._line(target, order, jog=jog)
         elif order.kind == "end":
@@ -476,41 +478,8 @@ class GrblBoard:
         system = self.eeprom.offsets[f"G{self.modal.system}"]
         return [a + b for a, b in zip(system, self.g92, strict=True)]
 
-    def _target(self, order: Order) -> list[float]:
-        target, offset = self.planned_mm(), self.offset_mm()
-        for axis, value in order.axes.items():
-            if order.machine:
-                target[axis] = value
-            elif order.incremental:
-                target[axis] += value
-            else:
-                target[axis] = value + offset[axis]
-        return target
-
-    def _set_offset(self, order: Order) -> None:
-        self.counters.offset = 0
-        if order.kind == "G92.1":
-            self.g92 = [0.0, 0.0, 0.0]
-            return
-        here = self.planned_mm()
-        row = self.modal.system if order.offset_row == 0 else 53 + order.offset_row
-        system = self.eeprom.offsets[f"G{row}"]
-        for axis, value in order.axes.items():
-            if order.kind == "G92":
-                self.g92[axis] = here[axis] - system[axis] - value
-            elif order.offset_mode == 2:
-                system[axis] = value
-            else:
-                system[axis] = here[axis] - self.g92[axis] - value
-
-    def _outside(self, target: list[float]) -> bool:
-        return any(
-            place > 0.0 or place < -self.eeprom[130 + axis]
-            for axis, place in enumerate(target)
-        )
-
     def _line(self, target: list[float], order: Order, *, jog: bool = False) -> Task:
-        if not jog and self.eeprom.flag(20) and self._outside(target):
+        if not jog and self.eeprom.flag(20) and outside(self, target):
             yield from self._soft_limit_alarm()
             return
         if self.state == "Check":
@@ -524,50 +493,10 @@ class GrblBoard:
             self._auto_start()
             yield self.now_s + _TICK_S
         feed = math.inf if order.rapid else order.feed_mm_min
-        self._plan(target, feed * self.overrides[0] / 100.0)
+        plan(self, target, feed * self.overrides[0] / 100.0)
         if jog and self.state == "Idle" and self.mover.blocks:
             self.state = "Jog"
             self.mover.start(self.now_s)
-
-    def _plan(self, target: list[float], feed_mm_min: float) -> None:
-        per_mm = [self.eeprom[100 + axis] for axis in range(3)]
-        steps = [round(place * k) for place, k in zip(target, per_mm, strict=True)]
-        delta = tuple(a - b for a, b in zip(steps, self.planned, strict=True))
-        if not any(delta):
-            return
-        moves = [d / k if k else 0.0 for d, k in zip(delta, per_mm, strict=True)]
-        length = math.hypot(*moves) or 1.0
-        unit = [abs(move) / length for move in moves]
-        ceilings = [
-            (self.eeprom[110 + a] / 60.0 / u, self.eeprom[120 + a] / u)
-            for a, u in enumerate(unit)
-            if u
-        ]
-        rate = min(c[0] for c in ceilings) if ceilings else 1.0
-        block = Block(
-            delta=(delta[0], delta[1], delta[2]),
-            length_mm=length,
-            speed_mm_s=min(feed_mm_min / 60.0, rate),
-            acceleration_mm_s2=min((c[1] for c in ceilings), default=10.0),
-            junction_mm_s=self._junction(moves, length),
-        )
-        self.mover.add(block)
-        self._last_direction = [move / length for move in moves]
-        self.planned = steps
-
-    def _junction(self, moves: list[float], length_mm: float) -> float:
-        """Speed through the corner: straight on is free, a turn back is a stop."""
-        if not self.mover.blocks:
-            return 0.0
-        cosine = sum(
-            a * b / length_mm for a, b in zip(self._last_direction, moves, strict=True)
-        )
-        if cosine > 0.9999:
-            return math.inf
-        if cosine < -0.9999:
-            return 0.0
-        sine = math.sqrt(0.5 * (1.0 + cosine))
-        return math.sqrt(self.eeprom[120] * self.eeprom[11] * sine / (1.0 - sine))
 
     def _soft_limit_alarm(self) -> Task:
         self._soft_limit = True
