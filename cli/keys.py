@@ -32,8 +32,8 @@ def terminating() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def pausing(control: RunControl) -> Iterator[None]:
-    """Let the key p and the signal USR1 pause the run, and let it go on again."""
+def pausing(control: RunControl, *, keys: bool) -> Iterator[None]:
+    """Let the signal USR1, and the key p if `keys`, pause the run and let it go on."""
     is_over = threading.Event()
     with contextlib.ExitStack() as undo:
         undo.callback(is_over.set)
@@ -42,7 +42,7 @@ def pausing(control: RunControl) -> Iterator[None]:
                 signal.SIGUSR1, lambda _number, _frame: control.toggle_pause()
             )
             undo.callback(signal.signal, signal.SIGUSR1, previous)
-        if sys.stdin.isatty() and sys.stderr.isatty():
+        if keys and sys.stdin.isatty() and sys.stderr.isatty():
             undo.enter_context(_single_keys())
             threading.Thread(
                 target=_listen, args=(control, is_over), daemon=True, name="keys"

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import math
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import typer
 
 from ..core.errors import StoreError
 
@@ -18,6 +22,30 @@ if TYPE_CHECKING:
 def needs_twin(plan: Plan) -> bool:
     """Return whether the rig file names the computed bench."""
     return plan.rig.camera.backend == "twin" or plan.rig.meter.driver == "twin"
+
+
+def asks_flux(plan: Plan, readings_mT: dict[float, float] | None) -> bool:
+    """Return whether the readings of a hand meter are asked for at each gap."""
+    by_hand = plan.rig.meter.driver == "manual" and readings_mT is None
+    return by_hand and sys.stdin.isatty()
+
+
+def ask_flux(gap_mm: float) -> float | None:
+    """Ask for the reading of a hand meter; Enter means that there is none."""
+    while True:
+        text = typer.prompt(
+            f"Tesla-meter at {gap_mm:g} mm, in mT (Enter: none)",
+            default="", show_default=False, err=True,
+        )  # fmt: skip
+        if not text.strip():
+            return None
+        try:
+            value = float(text.replace(",", "."))
+        except ValueError:
+            value = math.nan
+        if math.isfinite(value):
+            return value
+        typer.echo(f"a reading must be a number in mT; instead received {text!r}")
 
 
 @contextlib.contextmanager
@@ -58,8 +86,9 @@ def open_bench(
     with contextlib.closing(log):
         if twin_seed is None:
             devices = open_devices(
-                plan, clock, log=log, readings_mT=readings_mT, with_camera=camera
-            )
+                plan, clock, log=log, readings_mT=readings_mT, with_camera=camera,
+                ask=ask_flux if asks_flux(plan, readings_mT) else None,
+            )  # fmt: skip
         else:
             from ..analysis.twin_run import open_twin_bench, photograph_board
 

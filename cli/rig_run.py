@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..core.errors import InputError, RigError, StoreError
+from ..core.errors import InputError, StoreError
 from .console import print_json, progress
-from .rig_bench import needs_twin, open_bench
+from .rig_bench import asks_flux, needs_twin, open_bench
+from .rig_show import print_dry_run, print_scan, print_summary
 
 if TYPE_CHECKING:
     from ..rig.config import Plan
     from ..rig.devices import Devices
     from ..rig.runner import RunSummary
-    from ..rig.scan_field import FieldScan
 
 RUN_EXAMPLE = "Example: magbend rig run plan.toml --out runs/gmc2"
 VERIFY_EXAMPLE = "Example: magbend rig verify runs/gmc2"
@@ -61,6 +63,10 @@ def run(
     ] = False,
     flux_mT: Manual = "",
     assume_gap_mm: AssumeGap = None,
+    live_port: Annotated[
+        int | None,
+        typer.Option(help="Show camera and state on this port of 127.0.0.1; 0: any."),
+    ] = None,
     twin: Twin = False,
     seed: Seed = 1,
     as_json: Json = False,
@@ -75,14 +81,15 @@ def run(
 
     checked = read_plan(plan)
     if dry_run:
-        _print_dry_run(checked, as_json)
+        print_dry_run(checked, as_json)
         return
     folder = _run_folder(checked, out, resume)
     readings_mT = _readings_mT(flux_mT, checked.gaps_mm)
     summary = _carry_out(
-        checked, folder, resume, readings_mT, assume_gap_mm, twin, seed
-    )
-    _print_summary(summary, as_json)
+        checked, folder, resume, readings_mT, assume_gap_mm,
+        _twin_seed(checked, twin, seed, readings_mT), live_port,
+    )  # fmt: skip
+    print_summary(summary, as_json)
     if summary.status != "success":
         raise typer.Exit(1)
 
@@ -144,20 +151,18 @@ def scan_field(
     gaps = tuple(_numbers(gaps_mm, "--gaps-mm")) if gaps_mm else checked.gaps_mm
     folder = out or Path("scans") / _dated_name(checked)
     readings_mT = _readings_mT(flux_mT, gaps)
-    is_twin = twin or needs_twin(checked)
+    twin_seed = _twin_seed(checked, twin, seed, readings_mT)
     from ..rig.scan_field import scan_field as scan
 
     with (
-        open_bench(
-            checked, folder, readings_mT, seed if is_twin else None, camera=False
-        ) as devices,
+        open_bench(checked, folder, readings_mT, twin_seed, camera=False) as devices,
         progress("scan") as tell,
     ):
         _assume(devices, assume_gap_mm)
         found = scan(
             devices, gaps, folder, samples=samples, report=_report, progress=tell
         )
-    _print_scan(checked, found, tolerance_percent, as_json)
+    print_scan(checked, found, tolerance_percent, as_json)
 
 
 def init(
@@ -192,6 +197,20 @@ def _run_folder(plan: Plan, out: Path | None, resume: bool) -> Path:
             f"another folder with --out"
         )
     return folder
+
+
+def _twin_seed(
+    plan: Plan, twin: bool, seed: int, readings_mT: dict[float, float] | None
+) -> int | None:
+    """Return the seed of the computed bench, or None for the real one."""
+    if not (twin or needs_twin(plan)):
+        return None
+    if readings_mT is not None:
+        raise InputError(
+            "--flux-mT gives readings of a hand meter, but the computed bench has a "
+            "meter of its own; leave one of the two out"
+        )
+    return seed
 
 
 def _dated_name(plan: Plan) -> str:
@@ -230,137 +249,51 @@ def _carry_out(
     resume: bool,
     readings_mT: dict[float, float] | None,
     assume_gap_mm: float | None,
-    twin: bool,
-    seed: int,
+    twin_seed: int | None,
+    live_port: int | None,
 ) -> RunSummary:
     from ..rig.control import RunControl
     from ..rig.runner import run as carry_out
     from .keys import pausing, terminating
 
     control = RunControl(folder)
-    is_twin = twin or needs_twin(plan)
+    keys = not asks_flux(plan, readings_mT)
     with (
         terminating(),
-        open_bench(plan, folder, readings_mT, seed if is_twin else None) as devices,
-        pausing(control),
+        open_bench(plan, folder, readings_mT, twin_seed) as devices,
+        pausing(control, keys=keys),
+        _watching(devices, live_port) as report,
         progress(plan.model.name) as tell,
     ):
         _assume(devices, assume_gap_mm)
         return carry_out(
-            plan, devices, folder, resume=resume, twin=is_twin, control=control,
-            report=_report, progress=tell,
+            plan, devices, folder, resume=resume, twin=twin_seed is not None,
+            control=control, report=report, progress=tell,
         )  # fmt: skip
+
+
+@contextlib.contextmanager
+def _watching(devices: Devices, port: int | None) -> Iterator[Callable[[str], None]]:
+    """Yield where the run reports to; with a port, a page in the browser too."""
+    if port is None:
+        yield _report
+        return
+    from ..rig.live_view import LiveStatus, live_view
+
+    if not hasattr(devices.camera, "newest"):
+        raise InputError("--live-port needs a camera or stream; files are not watched")
+    status = LiveStatus()
+
+    def report(line: str) -> None:
+        status.report(line)
+        _report(line)
+
+    now_s = devices.clock.monotonic_s
+    with live_view(devices.camera, status, now_s, port=port) as address:
+        _report(f"live view: {address}")
+        yield report
 
 
 def _assume(devices: Devices, gap_mm: float | None) -> None:
     if gap_mm is not None:
         devices.stage.assume_gap(gap_mm)
-
-
-def _print_dry_run(plan: Plan, as_json: bool) -> None:
-    from ..rig.dry_run import homing_s, plan_steps
-
-    steps = plan_steps(plan)
-    previews: dict[int, Any] = {}
-    if plan.rig.magnet is not None:
-        from ..analysis.plan_preview import preview_plan
-
-        magnet = plan.rig.magnet.magnet()
-        found = preview_plan(plan.specimen, magnet, plan.gaps_mm)
-        previews = dict(enumerate(found))
-    total_s = homing_s(plan) + sum(step.time_s for step in steps)
-    rows = []
-    for step in steps:
-        preview = previews.get(step.index)
-        tip = preview.tip_mm if preview else None
-        rows.append(
-            {
-                "index": step.index,
-                "gap_mm": step.gap_mm,
-                "stage_mm": step.stage_mm,
-                "move_mm": step.move_mm,
-                "time_s": step.time_s,
-                "predicted_flux_mT": preview.flux_mT if preview else None,
-                "predicted_tip_x_mm": tip[0] if tip else None,
-                "predicted_tip_y_mm": tip[1] if tip else None,
-                "predicted_status": preview.status if preview else None,
-            }
-        )
-    if as_json:
-        print_json({"name": plan.model.name, "total_s": total_s, "steps": rows})
-        return
-    typer.echo(f"{plan.model.name}: {plan.specimen.name} on {plan.rig.name}")
-    typer.echo("step  gap mm  stage mm  move mm   time s  flux mT  tip x, y mm")
-    for row in rows:
-        typer.echo(_dry_line(row))
-    typer.echo(
-        f"about {total_s / 60.0:.0f} min with homing; every gap is inside the limits; "
-        f"nothing was moved"
-    )
-
-
-def _dry_line(row: dict[str, Any]) -> str:
-    line = (
-        f"{row['index'] + 1:4d} {row['gap_mm']:7.2f} {row['stage_mm']:9.2f} "
-        f"{row['move_mm']:8.2f} {row['time_s']:8.1f}"
-    )
-    if row["predicted_flux_mT"] is None:
-        return line + "        -  (no [magnet] in the rig file)"
-    line += f" {row['predicted_flux_mT']:8.2f}"
-    if row["predicted_tip_x_mm"] is None:
-        return line + f"  {row['predicted_status']}"
-    tip = f"  {row['predicted_tip_x_mm']:.2f}, {row['predicted_tip_y_mm']:.2f}"
-    doubt = row["predicted_status"]
-    return line + tip + (f"  ({doubt})" if doubt != "stable" else "")
-
-
-def _print_summary(summary: RunSummary, as_json: bool) -> None:
-    if as_json:
-        print_json(
-            {
-                "run": str(summary.path),
-                "status": summary.status,
-                "reason": summary.reason,
-                "steps_done": summary.steps_done,
-                "steps_total": summary.steps_total,
-                "flagged": list(summary.flagged),
-            }
-        )
-        return
-    if summary.status == "success":
-        typer.echo(str(summary.path))
-        return
-    typer.echo(
-        f"magbend: {summary.status}: {' '.join(summary.reason.split())} "
-        f"({summary.steps_done} of {summary.steps_total} steps are recorded in "
-        f"{summary.path}; go on with --resume --out {summary.path})",
-        err=True,
-    )
-
-
-def _print_scan(
-    plan: Plan, found: FieldScan, tolerance_percent: float, as_json: bool
-) -> None:
-    data: dict[str, Any] = {
-        "field": str(found.path),
-        "readings": len(found.gaps_mm),
-        "skipped": list(found.skipped),
-    }
-    lines = [str(found.path), *(f"no reading at {line}" for line in found.skipped)]
-    if plan.rig.magnet is not None and len(found.gaps_mm) >= 2:
-        from ..analysis.field_scan import judge_scan
-
-        judged = judge_scan(
-            found.path, found.gaps_mm, found.flux_mT, found.sd_mT,
-            plan.rig.magnet.magnet(), tolerance_percent=tolerance_percent,
-        )  # fmt: skip
-        data["magnet"] = judged.as_dict()
-        lines += judged.lines()
-    if as_json:
-        print_json(data)
-    else:
-        typer.echo("\n".join(lines))
-    if not found.gaps_mm:
-        raise RigError(
-            "not one gap has a reading; check the range of the meter and its port"
-        )

@@ -144,6 +144,11 @@ class CaptureCamera:
     def at_step(self, index: int, gap_mm: float) -> None:
         """Take no note: a camera sees what is there."""
 
+    def newest(self) -> Frame | None:
+        """Return the newest picture at once, or None before the first."""
+        with self._changed:
+            return self._state.newest
+
     def grab_after(self, time_s: float) -> Frame:
         """Return the newest picture whose transfer began after `time_s` plus latency.
 

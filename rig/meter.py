@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -105,6 +105,10 @@ def combine(samples: Sequence[Sample], *, zero_mT: float = 0.0, sign: int = 1) -
     )  # fmt: skip
 
 
+Ask = Callable[[float], float | None]
+"""Ask the person at the bench for the reading at a gap in mm."""
+
+
 class NoMeter:
     """No meter at all: every step says so."""
 
@@ -129,10 +133,14 @@ class ManualMeter:
     ----------
     flux_mT : mapping of float to float
         Flux density in mT per gap in mm.
+    ask : callable, optional
+        Called with a gap that has none; returns what the person reads there, in mT, or
+        None.
     """
 
-    def __init__(self, flux_mT: Mapping[float, float]) -> None:
+    def __init__(self, flux_mT: Mapping[float, float], ask: Ask | None = None) -> None:
         self._flux_mT = dict(flux_mT)
+        self._ask = ask
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -143,6 +151,8 @@ class ManualMeter:
         """Return the typed reading of this gap, else a status ``none``."""
         del samples
         flux_mT = self._flux_mT.get(gap_mm)
+        if flux_mT is None and self._ask is not None:
+            flux_mT = self._ask(gap_mm)
         if flux_mT is None:
             return Flux(status="none")
         return Flux(status="manual", flux_mT=flux_mT, samples=1)

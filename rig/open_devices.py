@@ -14,7 +14,7 @@ from .config import CameraConfig, MeterConfig, Plan, RigModel
 from .devices import Devices
 from .gap_stage import GapStage
 from .link import WireLog
-from .meter import ManualMeter, Meter, NoMeter
+from .meter import Ask, ManualMeter, Meter, NoMeter
 
 
 def open_camera(config: CameraConfig, folder: Path, clock: Clock) -> Camera:
@@ -103,6 +103,7 @@ def open_meter(
     folder: Path,
     *,
     readings_mT: Mapping[float, float] | None = None,
+    ask: Ask | None = None,
     log: WireLog | None = None,
 ) -> Meter:
     """Open the Tesla-meter of a rig file.
@@ -115,6 +116,8 @@ def open_meter(
         The folder of the rig file.
     readings_mT : mapping of float to float, optional
         Typed readings in mT per gap in mm; they replace the meter.
+    ask : callable, optional
+        Asks the person at the bench, where the driver is ``manual``.
     log : WireLog, optional
         Where every byte is recorded.
 
@@ -126,7 +129,7 @@ def open_meter(
         If its description is wrong, or the port is missing.
     """
     if readings_mT is not None or config.driver == "manual":
-        return ManualMeter(readings_mT or {})
+        return ManualMeter(readings_mT or {}, ask)
     if config.driver == "none":
         return NoMeter()
     if config.driver == "twin":
@@ -177,6 +180,7 @@ def open_devices(
     *,
     log: WireLog | None = None,
     readings_mT: Mapping[float, float] | None = None,
+    ask: Ask | None = None,
     with_camera: bool = True,
 ) -> Devices:
     """Open every device that a plan needs, or none.
@@ -191,6 +195,8 @@ def open_devices(
         Where every byte is recorded.
     readings_mT : mapping of float to float, optional
         Typed readings that replace the meter.
+    ask : callable, optional
+        Asks the person at the bench, where the meter is ``manual``.
     with_camera : bool
         False where no picture is taken (scan-field).
 
@@ -203,7 +209,9 @@ def open_devices(
     with contextlib.ExitStack() as opened:
         stage = open_stage(plan.rig, clock, log=log)
         opened.callback(stage.close)
-        meter = open_meter(plan.rig.meter, folder, readings_mT=readings_mT, log=log)
+        meter = open_meter(
+            plan.rig.meter, folder, readings_mT=readings_mT, ask=ask, log=log
+        )
         opened.callback(meter.close)
         camera: Camera = NoCamera()
         if with_camera:

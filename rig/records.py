@@ -14,6 +14,7 @@ from typing import Any
 RUN_FILE = "run.json"
 PLAN_FILE = "plan.toml"
 STEPS_FILE = "steps.jsonl"
+STEP_TABLE_FILE = "steps.csv"
 END_FILE = "end.json"
 SESSIONS_FILE = "sessions.jsonl"
 WIRE_FILE = "wire.log"

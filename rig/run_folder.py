@@ -25,6 +25,7 @@ from .records import (
     PLAN_FILE,
     RUN_FILE,
     SESSIONS_FILE,
+    STEP_TABLE_FILE,
     STEPS_FILE,
     WIRE_FILE,
     Record,
@@ -33,6 +34,7 @@ from .records import (
     sha256_of_file,
     utc_now,
 )
+from .step_table import step_table
 
 
 class RunFolder:
@@ -149,7 +151,9 @@ class RunFolder:
         """
         # Not the wire log: closing the devices is still written to it.
         names = (RUN_FILE, PLAN_FILE, STEPS_FILE, SESSIONS_FILE)
+        steps = read_steps(self.path / STEPS_FILE).steps
         with _interrupts_later(), _store_errors(self.path):
+            write_text(self.path / STEP_TABLE_FILE, step_table(steps))
             end = {
                 "status": status,
                 "reason": reason,

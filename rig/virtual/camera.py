@@ -62,6 +62,7 @@ class VirtualCamera:
         self._faults = dict(faults or {})
         self._arrived_s = -math.inf
         self._number = 0
+        self._newest: Frame | None = None
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -95,10 +96,15 @@ class VirtualCamera:
         image = self._render(self._gap() + self._swing_mm(arrival_s), arrival_s)
         if fault == "dark":
             image = (image * 0.5).astype(image.dtype)
-        return Frame(
+        self._newest = Frame(
             image=image, arrival_s=arrival_s, number=self._number,
             time_utc=self._clock.utc().isoformat(timespec="milliseconds"),
         )  # fmt: skip
+        return self._newest
+
+    def newest(self) -> Frame | None:
+        """Return the last picture, or None before the first."""
+        return self._newest
 
     def close(self) -> None:
         """Do nothing."""

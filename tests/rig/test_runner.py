@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import cv2
+import pandas as pd
 import pytest
 
 from magbend.core.errors import CameraError, StoreError
@@ -28,6 +29,10 @@ def test_a_run_records_every_step_and_verifies(bench, tmp_path: Path) -> None:
     assert record.manifest["devices"]["stage"]["settings"] == {"$100": "250.000"}
     image = cv2.imread(str(out / "images/step_002.png"), cv2.IMREAD_UNCHANGED)
     assert image.shape == (96, 128)
+    table = pd.read_csv(out / "steps.csv")
+    assert list(table["gap_mm"]) == [70.0, 60.0, 50.0]
+    assert table["flux_mT"].dtype == float
+    assert table["image"][2] == "images/step_002.png"
 
 
 def test_every_gap_is_reached_from_the_far_side(bench, tmp_path: Path) -> None:

@@ -1,0 +1,127 @@
+"""What the run commands print: a dry run, the end of a run, a field scan."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from ..core.errors import RigError
+from .console import print_json
+
+if TYPE_CHECKING:
+    from ..rig.config import Plan
+    from ..rig.runner import RunSummary
+    from ..rig.scan_field import FieldScan
+
+
+def print_dry_run(plan: Plan, as_json: bool) -> None:
+    """Print the steps of a plan with what the simulator expects at each."""
+    from ..rig.dry_run import homing_s, plan_steps
+
+    steps = plan_steps(plan)
+    previews: dict[int, Any] = {}
+    if plan.rig.magnet is not None:
+        from ..analysis.plan_preview import preview_plan
+
+        magnet = plan.rig.magnet.magnet()
+        found = preview_plan(plan.specimen, magnet, plan.gaps_mm)
+        previews = dict(enumerate(found))
+    total_s = homing_s(plan) + sum(step.time_s for step in steps)
+    rows = []
+    for step in steps:
+        preview = previews.get(step.index)
+        tip = preview.tip_mm if preview else None
+        rows.append(
+            {
+                "index": step.index,
+                "gap_mm": step.gap_mm,
+                "stage_mm": step.stage_mm,
+                "move_mm": step.move_mm,
+                "time_s": step.time_s,
+                "predicted_flux_mT": preview.flux_mT if preview else None,
+                "predicted_tip_x_mm": tip[0] if tip else None,
+                "predicted_tip_y_mm": tip[1] if tip else None,
+                "predicted_status": preview.status if preview else None,
+            }
+        )
+    if as_json:
+        print_json({"name": plan.model.name, "total_s": total_s, "steps": rows})
+        return
+    typer.echo(f"{plan.model.name}: {plan.specimen.name} on {plan.rig.name}")
+    typer.echo("step  gap mm  stage mm  move mm   time s  flux mT  tip x, y mm")
+    for row in rows:
+        typer.echo(_dry_line(row))
+    typer.echo(
+        f"about {total_s / 60.0:.0f} min with homing; every gap is inside the limits; "
+        f"nothing was moved"
+    )
+
+
+def _dry_line(row: dict[str, Any]) -> str:
+    line = (
+        f"{row['index'] + 1:4d} {row['gap_mm']:7.2f} {row['stage_mm']:9.2f} "
+        f"{row['move_mm']:8.2f} {row['time_s']:8.1f}"
+    )
+    if row["predicted_flux_mT"] is None:
+        return line + "        -  (no [magnet] in the rig file)"
+    line += f" {row['predicted_flux_mT']:8.2f}"
+    if row["predicted_tip_x_mm"] is None:
+        return line + f"  {row['predicted_status']}"
+    tip = f"  {row['predicted_tip_x_mm']:.2f}, {row['predicted_tip_y_mm']:.2f}"
+    doubt = row["predicted_status"]
+    return line + tip + (f"  ({doubt})" if doubt != "stable" else "")
+
+
+def print_summary(summary: RunSummary, as_json: bool) -> None:
+    """Print how a run ended: its folder, or a sentence and how to go on."""
+    if as_json:
+        print_json(
+            {
+                "run": str(summary.path),
+                "status": summary.status,
+                "reason": summary.reason,
+                "steps_done": summary.steps_done,
+                "steps_total": summary.steps_total,
+                "flagged": list(summary.flagged),
+            }
+        )
+        return
+    if summary.status == "success":
+        typer.echo(str(summary.path))
+        return
+    typer.echo(
+        f"magbend: {summary.status}: {' '.join(summary.reason.split())} "
+        f"({summary.steps_done} of {summary.steps_total} steps are recorded in "
+        f"{summary.path}; go on with --resume --out {summary.path})",
+        err=True,
+    )
+
+
+def print_scan(
+    plan: Plan, found: FieldScan, tolerance_percent: float, as_json: bool
+) -> None:
+    """Print a field scan and what it says about the magnet."""
+    data: dict[str, Any] = {
+        "field": str(found.path),
+        "readings": len(found.gaps_mm),
+        "skipped": list(found.skipped),
+    }
+    lines = [str(found.path), *(f"no reading at {line}" for line in found.skipped)]
+    if plan.rig.magnet is not None and len(found.gaps_mm) >= 2:
+        from ..analysis.field_scan import judge_scan
+
+        judged = judge_scan(
+            found.path, found.gaps_mm, found.flux_mT, found.sd_mT,
+            plan.rig.magnet.magnet(), tolerance_percent=tolerance_percent,
+        )  # fmt: skip
+        data["magnet"] = judged.as_dict()
+        lines += judged.lines()
+    if as_json:
+        print_json(data)
+    else:
+        typer.echo("\n".join(lines))
+    if not found.gaps_mm:
+        raise RigError(
+            "not one gap has a reading; check the range of the meter and its port"
+        )
