@@ -171,37 +171,27 @@ def _distributed(p, field, y, b, Z, F, b2):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def step(h, p, field, y, Z, K, KZ, ys, Zs, b, b2):  # type: ignore[no-untyped-def]
     """Advance the state `y` and the columns `Z` (12, c; c may be 0) by `h`."""
-    columns = Z.shape[1]
+    z, zs, kz = Z.reshape(-1), Zs.reshape(-1), KZ.reshape(7, -1)
     for stage in range(7):
-        for i in range(STATE):
-            v = 0.0
-            for j in range(stage):
-                v += _A[stage, j] * K[j, i]
-            ys[i] = y[i] + h * v
+        ys[:] = y
+        zs[:] = z
+        for j in range(stage):
+            c = h * _A[stage, j]
+            if c != 0.0:
+                for i in range(STATE):
+                    ys[i] += c * K[j, i]
+                for i in range(z.shape[0]):
+                    zs[i] += c * kz[j, i]
         _slope(p, field, ys, K[stage], b)
-        if columns > 0:
-            for i in range(COLUMN):
-                for a in range(columns):
-                    Zs[i, a] = 0.0
-                for j in range(stage):
-                    c = h * _A[stage, j]
-                    if c != 0.0:
-                        for a in range(columns):
-                            Zs[i, a] += c * KZ[j, i, a]
-                for a in range(columns):
-                    Zs[i, a] += Z[i, a]
+        if z.shape[0] > 0:
             _column_slope(p, field, ys, b, Zs, KZ[stage], b2)
-    for i in range(STATE):
-        v = 0.0
-        for j in range(7):
-            v += _B[j] * K[j, i]
-        y[i] += h * v
     for j in range(7):
         c = h * _B[j]
         if c != 0.0:
-            for i in range(COLUMN):
-                for a in range(columns):
-                    Z[i, a] += c * KZ[j, i, a]
+            for i in range(STATE):
+                y[i] += c * K[j, i]
+            for i in range(z.shape[0]):
+                z[i] += c * kz[j, i]
 
 
 @njit(cache=True)

@@ -28,7 +28,7 @@ from .spatial_march import (
 )  # fmt: skip
 
 CONVERGED = 1e-11
-CHORD = 1e-3
+CHORD = 1e-2
 MIN_LOAD_STEP = 1e-6
 
 
