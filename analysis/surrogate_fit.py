@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -49,11 +50,13 @@ def draw(count: int, seed: int, *, towards_walls: bool = False) -> Designs:
     seed : int
     towards_walls : bool
         Draw with the density of Chebyshev points, dense at the walls of the domain,
-        where polynomials go astray first.
+        where polynomials go astray first, and begin with its 512 corners.
     """
     u = sobol_points(9, 0, count, seed)
     if towards_walls:
         u = 0.5 - 0.5 * np.cos(np.pi * u)
+        corners = np.array(list(itertools.product((0.0, 1.0), repeat=u.shape[1])))
+        u[: len(corners)] = corners[: len(u)]
     low, high = (
         np.repeat([DOMAIN[name][end] for name in DOMAIN], [3, 3, 1, 1, 1])
         for end in (0, 1)
