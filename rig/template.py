@@ -18,7 +18,7 @@ port = "auto"              # auto, /dev/ttyUSB0, COM3, or serial:NUMBER of the U
 axis = "X"
 # The gap is the distance from the magnet's N face to the rod's undeformed tip:
 #     gap_mm = gap_at_zero_mm + direction * machine_mm
-# Home the stage, measure the gap there, and solve for gap_at_zero_mm.
+# magbend rig set-gap writes gap_at_zero_mm once you have measured a gap.
 gap_at_zero_mm = 150.0
 direction = 1              # 1: the gap grows with the machine position, else -1
 feed_mm_min = 300.0

@@ -113,3 +113,11 @@ def test_templates_are_valid_and_never_overwrite(tmp_path: Path, twin: bool) -> 
     assert all("#" in path.read_text() for path in paths)
     with pytest.raises(StoreError, match="is not overwritten"):
         write_templates(folder)
+
+
+@pytest.mark.parametrize("name", ["plan.toml", "inline.toml"])
+def test_the_plans_in_fixtures_are_valid(name: str) -> None:
+    folder = Path(__file__).parents[2] / "fixtures" / "plans"
+    plan = read_plan(folder / name)
+    assert plan.rig.camera.backend == "twin"
+    assert len(plan_steps(plan)) == len(plan.gaps_mm)
