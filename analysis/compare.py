@@ -225,12 +225,12 @@ def fit_run_magnet(run: RunData) -> tuple[sim.MagnetFit | None, Magnet | None]:
     steps = [s for s in run.steps if usable_flux(s)]
     if run.magnet is None or not steps:
         return None, run.magnet
-    sd = np.array([s.flux_sd_mT for s in steps])
+    sd = [s.flux_sd_mT for s in steps]
     fit = sim.fit_magnet(
-        np.array([s.gap_mm for s in steps]),
-        np.array([s.flux_mT for s in steps]),
+        [s.gap_mm for s in steps],
+        [s.flux_mT for s in steps],
         sides_mm=run.magnet.sides_mm,
-        sd_mT=sd if np.all(np.isfinite(sd) & (sd > 0.0)) else None,
+        sd_mT=sd if all(math.isfinite(value) and value > 0.0 for value in sd) else None,
     )
     return fit, replace(run.magnet, remanence_T=fit.remanence_T)
 

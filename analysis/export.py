@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -141,7 +141,7 @@ def _matlab(data: dict[str, pd.DataFrame]) -> bytes:
         name: {key: column(table[key]) for key in table} for name, table in data.items()
     }
     buffer = io.BytesIO()
-    savemat(buffer, content, do_compression=True, long_field_names=True)
+    savemat(cast("Any", buffer), content, do_compression=True, long_field_names=True)
     return buffer.getvalue()
 
 

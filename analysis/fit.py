@@ -241,10 +241,10 @@ def _search(
 
     def evaluate(v: Array) -> tuple[Array, Array]:
         u = turn @ v + offset
-        data, jacobian = residuals(problem, u)
+        data, slopes = residuals(problem, u)
         return (
             np.concatenate([data, rows @ (u - prior[:, 0])]),
-            np.vstack([jacobian, rows]) @ turn,
+            np.vstack([slopes, rows]) @ turn,
         )
 
     start = np.clip(np.linalg.solve(turn, -offset), lower + 1e-3, upper - 1e-3)
@@ -264,10 +264,17 @@ def _search(
         return cache[key]
 
     bounded = bool(np.any(np.isfinite(lower)) or np.any(np.isfinite(upper)))
+
+    def residual(v: Array) -> Array:
+        return both(v)[0]
+
+    def jacobian(v: Array) -> Array:
+        return both(v)[1]
+
     found = least_squares(
-        lambda v: both(v)[0],
+        residual,
         start,
-        jac=lambda v: both(v)[1],
+        jac=jacobian,
         bounds=(lower, upper),
         method="trf" if bounded else "lm",
         x_scale="jac" if bounded else 1.0,

@@ -9,7 +9,7 @@ deviation, so that a prior is one more residual of weight one.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -475,7 +475,7 @@ def _derivatives(
     around = view.scale * np.column_stack([-view.turned[:, 1], view.turned[:, 0]])
     degree = math.pi / 180.0
     gravity = problem.support.gravity_m_s2
-    columns = {
+    columns: dict[str, Callable[[], Array]] = {
         "clamp_angle_deg": lambda: seen["clamp_angle_deg"] - degree * around,
         "frame_angle_deg": lambda: degree * around,
         "scale_percent": lambda: view.turned / 100.0,

@@ -8,7 +8,7 @@ cut off is read as far as it goes, and says so in `warnings`.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -377,7 +377,7 @@ def _how_to_measure(path: Path, name: str) -> str:
     )
 
 
-def _frame(path: Path, row: dict[str, Any], table: pd.DataFrame | None) -> Frame:
+def _frame(path: Path, row: Mapping[Any, Any], table: pd.DataFrame | None) -> Frame:
     points: dict[str, NDArray[np.float64]] = {}
     centreline = None
     status, reason = str(row["status"]), _text(row.get("reason"))
@@ -438,7 +438,7 @@ def _good(
     return np.asarray(values[keep])
 
 
-def _pose(row: dict[str, Any]) -> Pose | None:
+def _pose(row: Mapping[Any, Any]) -> Pose | None:
     values = [
         _number(row.get(name))
         for name in ("clamp_x_mm", "clamp_y_mm", "clamp_angle_deg")

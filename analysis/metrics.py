@@ -257,7 +257,7 @@ def circularity(s_mm: Array, kappa_per_mm: Array) -> float:
     square = float(np.trapezoid(np.square(kappa_per_mm), s_mm))
     if square <= 0.0:
         return math.nan
-    return total**2 / ((s_mm[-1] - s_mm[0]) * square)
+    return total**2 / (float(s_mm[-1] - s_mm[0]) * square)
 
 
 def quadratic_fit(points_mm: Array) -> tuple[float, float]:
@@ -296,7 +296,7 @@ def frechet_mm(first_mm: Array, second_mm: Array) -> float:
     p = np.ascontiguousarray(first_mm, dtype=np.float64)
     q = np.ascontiguousarray(second_mm, dtype=np.float64)
     low = max(math.dist(p[0], q[0]), math.dist(p[-1], q[-1]))
-    high = _greedy(p, q)
+    high = float(_greedy(p, q))
     if _reachable(p, q, low * (1.0 + 1e-12) + 1e-300):
         return low
     while high - low > 1e-9 * high:

@@ -198,8 +198,11 @@ def fit_standoff(
             ]
         )
 
+    def relative(unknown: Array) -> Array:
+        return np.asarray(model(unknown) / readings - 1.0)
+
     found = least_squares(
-        lambda u: model(u) / readings - 1.0,
+        relative,
         np.log([5.0 * readings.mean(), 0.5 * sides.mean()]),
         method="trf",
         bounds=(np.log([1e-3, 1e-4]), np.log([1e5, 1e2])),
@@ -211,7 +214,8 @@ def fit_standoff(
     spare = len(sides) - 2
     sd = np.full(2, math.nan)
     if spare > 0:
-        information = found.jac.T @ found.jac
+        jacobian = np.asarray(found.jac)
+        information = jacobian.T @ jacobian
         variance = 2.0 * found.cost / spare
         sd = np.sqrt(np.diag(np.linalg.inv(information)) * variance)
     mean = readings.mean()

@@ -11,7 +11,7 @@ from __future__ import annotations
 import io
 import re
 from contextlib import AbstractContextManager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -83,7 +83,7 @@ def drawing() -> AbstractContextManager[None]:
     """Return a context in which figures are drawn in the house style."""
     import matplotlib as mpl
 
-    return mpl.rc_context(_RC)
+    return mpl.rc_context(cast("Any", _RC))
 
 
 def new_figure(height_mm: float, *, gap: float = 0.24) -> Figure:

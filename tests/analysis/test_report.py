@@ -186,8 +186,20 @@ def test_budget_is_sorted_and_true(tmp_path: Path) -> None:
 def test_turning_the_clamp_counts_without_the_frame_that_turns_along(
     tmp_path: Path,
 ) -> None:
-    lines = {line.cause: line for line in tip_budget(compared(tmp_path / "a"))}
-    assert lines["direction of the clamp"].tip_um < 60.0
+    run = compared(tmp_path / "a")
+    assert run.magnet is not None
+    field = sim.MagnetField(magnet=run.magnet, gap_mm=50.0)
+    tips = []
+    for angle_deg in (-0.5, 0.5):
+        support = sim.Support(clamp_angle_deg=angle_deg)
+        line = sim.solve(run.run.specimen, field, support=support).centreline
+        assert line is not None
+        turn = np.radians(-angle_deg)
+        rotation = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
+        tips.append(np.array(rotation) @ line.tip_mm)
+    lines = {line.cause: line for line in tip_budget(run)}
+    moved_um = 1e3 * float(np.linalg.norm(tips[1] - tips[0]))
+    assert lines["direction of the clamp"].tip_um == pytest.approx(moved_um, rel=1e-3)
     # 0.3 deg of a rod of 30 mm
     assert lines["frame at the clamp"].tip_um == pytest.approx(157.0, rel=0.02)
 
