@@ -129,7 +129,26 @@ class GapStage:
         self._from_far_side = False
 
     def home(self) -> None:
-        """Find the reference; afterwards the position is ``homed``."""
+        """Find the reference; afterwards the position is ``homed``.
+
+        Raises
+        ------
+        InterlockError
+            If the switch lies nearer to the magnet than `min_gap_mm`: homing would
+            drive the rod into it. Nothing was sent.
+        StageError
+            If the reference is not found.
+        """
+        switch_mm = self._stage.limits.switch_mm
+        if switch_mm is not None:
+            gap_mm = self.to_gap_mm(switch_mm)
+            if gap_mm < self._bounds.min_gap_mm:
+                raise InterlockError(
+                    f"homing would drive the stage to a gap of {gap_mm:g} mm, nearer "
+                    f"than min_gap_mm = {self._bounds.min_gap_mm:g} mm; home away from "
+                    "the magnet ($23 on GRBL), or correct gap_at_zero_mm and direction "
+                    "in the rig file; nothing was sent"
+                )
         self._from_far_side = False
         self._stage.home()
 

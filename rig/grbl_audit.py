@@ -126,11 +126,13 @@ def limits_of(settings: Settings, config: StageConfig) -> StageLimits:
         number(settings, f"{base + index}") or math.nan for base in (100, 110, 120, 130)
     )
     homed_by_switches = config.homing == "switches"
+    downward = int(number(settings, "23") or 0) >> index & 1
     return StageLimits(
         step_mm=1.0 / steps,
         max_feed_mm_min=feed,
         acceleration_mm_s2=acceleration,
         travel_mm=(-travel, 0.0) if homed_by_switches else None,
+        switch_mm=(-travel if downward else 0.0) if homed_by_switches else None,
     )
 
 

@@ -118,12 +118,15 @@ class StageLimits:
         Ceilings of the axis.
     travel_mm : tuple of float or None
         Lowest and highest machine position, if the controller is homed by switches.
+    switch_mm : float or None
+        Machine position of the switch that homing runs to, if there is one.
     """
 
     step_mm: float
     max_feed_mm_min: float
     acceleration_mm_s2: float
     travel_mm: tuple[float, float] | None = None
+    switch_mm: float | None = None
 
     def stopping_mm(self, feed_mm_min: float) -> float:
         """Return the distance from a feed hold to standstill, v^2 / (2 a), in mm."""

@@ -78,8 +78,10 @@ def make_bench(
     return StageBench(clock, board, stage, raw)
 
 
-def homed_bench(**options: Any) -> StageBench:
-    bench = make_bench(**options)
+def homed_bench(
+    settings: dict[int, float] | None = None, /, **options: Any
+) -> StageBench:
+    bench = make_bench(settings, **options)
     bench.stage.connect()
     bench.stage.home()
     bench.stage.goto_gap(100.0)

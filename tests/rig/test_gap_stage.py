@@ -13,7 +13,7 @@ from magbend.rig.stage import InterlockError, PositionLostError
 from magbend.rig.stage_config import LimitsConfig
 from magbend.rig.virtual.plant import Plant
 
-from .stage_bench import homed_bench, make_bench
+from .stage_bench import SETTINGS, homed_bench, make_bench
 
 
 @pytest.fixture(autouse=True)
@@ -125,11 +125,28 @@ def test_unlocking_needs_the_operators_word():
 
 
 def test_a_mirrored_map_moves_the_other_way():
-    bench = homed_bench(gap_at_zero_mm=20.0, direction=-1)
+    bench = homed_bench(
+        SETTINGS | {23: 1},
+        gap_at_zero_mm=-60.0,
+        direction=-1,
+        plant=Plant(start_mm=(-180.0, -1.5, -1.5), switch_low_mm=-182.0),
+    )
     bench.stage.goto_gap(60.0)
-    assert bench.stage.status().stage_mm == pytest.approx(-40.0)
+    assert bench.stage.status().stage_mm == pytest.approx(-120.0)
+    away = bench.board.plant.carriage_mm[0]
     bench.stage.goto_gap(50.0)
-    assert bench.stage.status().stage_mm == pytest.approx(-30.0)
+    assert bench.stage.status().stage_mm == pytest.approx(-110.0)
+    assert bench.board.plant.carriage_mm[0] == pytest.approx(away + 10.0)
+
+
+def test_homing_toward_the_magnet_is_refused_before_a_byte_is_sent():
+    bench = make_bench(gap_at_zero_mm=20.0, direction=-1)
+    bench.stage.connect()
+    sent = []
+    bench.board.receive = sent.append
+    with pytest.raises(InterlockError, match="homing would drive"):
+        bench.stage.home()
+    assert sent == []
 
 
 def test_manual_homing_takes_the_operators_gap():
