@@ -240,6 +240,7 @@ class GrblStage:
         pieces = math.ceil(abs(distance) / self._config.piece_mm)
         with self._stop_if_interrupted():
             for piece in range(1, pieces + 1):
+                self._raise_if_stop_asked()
                 target = here + distance * piece / pieces
                 self._move_piece(session, target, feed_mm_min, moved)
 

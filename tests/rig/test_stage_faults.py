@@ -199,6 +199,32 @@ def test_soft_limit_alarm_of_another_sender_keeps_the_position():
     assert bench.true_gap_mm == pytest.approx(60.0, abs=0.005)
 
 
+def test_a_stop_asked_for_while_standing_is_met_before_the_next_motion():
+    bench = homed_bench()
+    stood = bench.board.plant.steps
+    bench.stage.request_stop()
+    with pytest.raises(StoppedError):
+        bench.stage.goto_gap(60.0)
+    assert bench.board.plant.steps == stood
+    assert not bench.stage.stop_requested()
+    bench.stage.goto_gap(60.0)
+    assert bench.true_gap_mm == pytest.approx(60.0, abs=0.005)
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.05, 0.3, 1.0, 2.0, 3.5, 5.0])
+def test_ctrl_c_at_any_time_of_a_move_stands_within_3_s_and_keeps_the_position(after_s):
+    bench = homed_bench()
+    bench.later(after_s, interrupt)
+    start_s = bench.clock.monotonic_s() + after_s
+    with pytest.raises(KeyboardInterrupt):
+        bench.stage.goto_gap(60.0)
+    assert bench.clock.monotonic_s() - start_s < 3.0
+    assert not bench.board.mover.running
+    assert bench.stage.position_state == "homed"
+    bench.stage.goto_gap(80.0)
+    assert bench.true_gap_mm == pytest.approx(80.0, abs=0.005)
+
+
 def test_power_cut_while_standing_is_seen_before_the_next_move():
     bench = homed_bench()
     bench.board.power_cycle()
