@@ -2,7 +2,7 @@
 
 The folder explains itself:
 
-    library.json           the space, its digest, versions, columns; written first
+    _library.json          the space, its digest, versions, columns; written first
     part-000000.parquet    designs 0 to partition_rows - 1, and so on
 
 A partition is written beside, synced and renamed, so that it is whole or absent: a
@@ -34,7 +34,7 @@ from .space import Space
 Columns = dict[str, NDArray]
 
 SCHEMA = 1
-MANIFEST = "library.json"
+MANIFEST = "_library.json"
 STATIONS = (25, 50, 75)
 """Percent of the length at which the shape is stored, beside the tip."""
 POINTS = 61
@@ -197,7 +197,7 @@ def require_pyarrow() -> None:
 
 
 def read_manifest(out: Path) -> dict[str, Any]:
-    """Return ``library.json`` of a library.
+    """Return ``_library.json`` of a library.
 
     Raises
     ------
