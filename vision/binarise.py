@@ -79,7 +79,7 @@ def binarise(grey: NDArray[np.float32], *, invert: bool | None = None) -> Binary
         invert = bool(high - middle > middle - low)
     if invert:
         work = np.float32(max(high, float(sample.max()))) - work
-    ratio = np.asarray(cv2.divide(work, background(work)))
+    ratio = np.asarray(cv2.divide(work, background(work)), dtype=np.float32)
     return _threshold(ratio, factor, invert)
 
 
@@ -141,7 +141,9 @@ def background(work: NDArray[np.float32]) -> NDArray[np.float32]:
     for band in (0.25, 0.15, 0.1, 0.1):
         design = basis[inside]
         normal = design.T @ design + 1e-9 * np.eye(6)
-        coefficients = np.linalg.solve(normal, design.T @ value[inside])
+        coefficients = np.asarray(
+            np.linalg.solve(normal, design.T @ value[inside]), dtype=np.float64
+        )
         fit = basis @ coefficients
         level = np.maximum(fit, 1e-3)
         inside = np.abs(value - fit) < band * level

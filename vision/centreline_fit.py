@@ -120,17 +120,17 @@ class CurveFit:
     @property
     def sigma(self) -> Array:
         """Standard deviation of the normal position, shape (n,)."""
-        return np.sqrt(np.sum(self.normal_root**2, axis=1))
+        return np.asarray(np.sqrt(np.sum(self.normal_root**2, axis=1)))
 
     @property
     def sigma_theta(self) -> Array:
         """Standard deviation of theta, shape (n,)."""
-        return np.sqrt(np.sum(self.theta_root**2, axis=1))
+        return np.asarray(np.sqrt(np.sum(self.theta_root**2, axis=1)))
 
     @property
     def sigma_kappa(self) -> Array:
         """Standard deviation of kappa, shape (n,)."""
-        return np.sqrt(np.sum(self.kappa_root**2, axis=1))
+        return np.asarray(np.sqrt(np.sum(self.kappa_root**2, axis=1)))
 
 
 def fit_curve(
@@ -182,7 +182,9 @@ def fit_curve(
         theta = _chord_angles(points)
     start = basis.T @ basis + 1e-3 * penalty * spacing**5
     start += 1e-9 * np.eye(basis.shape[1])
-    coefficients = np.linalg.solve(start, basis.T @ theta)
+    coefficients: Array = np.asarray(
+        np.linalg.solve(start, basis.T @ theta), dtype=np.float64
+    )
     weight = weights / max(float(weights.max()), 1e-12)
     origin = _origin(s, points, weight, basis_mid @ coefficients)
     for _ in range(iterations):
@@ -424,7 +426,7 @@ def _with_covariance(
     )
 
 
-def _correlation(residual: Array, weight: Array, lags: int = 8) -> float:
+def _correlation(residual: Array, weight: Array, lags: int = 24) -> float:
     """Return 1 + 2 sum of the residuals' autocorrelation, at least 1."""
     value = np.where(weight > 0.0, np.nan_to_num(residual), 0.0)
     used = (weight > 0.0).astype(np.float64)
@@ -437,7 +439,7 @@ def _correlation(residual: Array, weight: Array, lags: int = 8) -> float:
         if pairs < 4.0:
             break
         rho = float(value[lag:] @ value[:-lag]) / pairs / power
-        if rho < 0.05:
+        if rho < 0.02:
             break
         total += 2.0 * rho
     return total

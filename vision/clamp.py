@@ -101,7 +101,8 @@ def _front(
     contrast: float, reach: float, sign: float,
 ) -> EndFace | None:  # fmt: skip
     beside = np.linspace(0.5 * width + near + 3.0, 1.6 * width + near + 3.0, _LANES)
-    crossings, offsets = [], []
+    crossings: list[float] = []
+    offsets: list[float] = []
     for across in (-beside[::-1], beside):
         light = lanes(grey, curve, s, across, sign)
         mean = light.mean(axis=0)

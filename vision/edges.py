@@ -217,7 +217,7 @@ def _bilinear(grey: Image, x: float, y: float) -> float:
     u, v = x - j, y - i
     top = grey[i, j] * (1.0 - u) + grey[i, j + 1] * u
     bottom = grey[i + 1, j] * (1.0 - u) + grey[i + 1, j + 1] * u
-    return top * (1.0 - v) + bottom * v
+    return float(top * (1.0 - v) + bottom * v)
 
 
 @njit(cache=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,13 +16,18 @@ from .centreline_fit import Curve
 from .measurement import Measurement, failure
 from .photo import Photo
 from .quality import doubts, refusal
-from .refine import LostError, Refined, refine
+from .refine import LostError, refine
 from .rod import Candidate, find_candidates
 from .specimen_frame import Setting, measurement
 from .track import start_curve
 
 Array = NDArray[np.float64]
 Clamp = Literal["auto", "none"]
+
+_BROKEN = (
+    np.linalg.LinAlgError, ArithmeticError, ValueError, IndexError, cv2.error
+)  # fmt: skip
+"""What numerics raise on pictures that hold no rod after all."""
 
 LEAST_LENGTH = 0.08
 """Shortest rod, in diagonals of the picture: below that it is dust, hair or print."""
@@ -81,7 +87,7 @@ def extract(
         return failure(lost.flag, lost.reason)
     except MagbendError as error:
         return failure("calibration_mismatch", str(error))
-    except (np.linalg.LinAlgError, FloatingPointError, ValueError, IndexError) as error:
+    except _BROKEN as error:
         return failure("not_measurable", f"the picture cannot be measured ({error})")
 
 
@@ -182,6 +188,3 @@ def _accept(rod: Candidate) -> Candidate:
         what = "the border of the picture" if rod.root == "border" else "another object"
         raise LostError(flag, f"the rod touches {what} besides its root")
     return rod
-
-
-__all__ = ["Refined", "extract"]

@@ -134,7 +134,7 @@ def as_photo(
             f"{width} x {height} px"
         )
     if grey.dtype == np.uint8:
-        top, light = 255, cv2.LUT(grey, _table(8, linear))
+        top, light = 255, np.asarray(cv2.LUT(grey, _table(8, linear)), np.float32)
     elif grey.dtype == np.uint16:
         top, light = 65535, _table(16, linear)[grey]
     else:
@@ -155,7 +155,7 @@ def _table(bits: int, linear: bool) -> NDArray[np.float32]:
     code = np.arange(2**bits) / (2**bits - 1)
     if not linear:
         code = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
-    return code.astype(np.float32)
+    return np.asarray(code, dtype=np.float32)
 
 
 def _to_grey(pixels: NDArray[Any], source: str) -> NDArray[Any]:

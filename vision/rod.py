@@ -75,16 +75,16 @@ def find_candidates(binary: Binary) -> list[Candidate]:
     )
     if tree is None:
         return []
-    tree = np.reshape(tree, (-1, 4))
+    links = np.reshape(np.asarray(tree, dtype=np.int32), (-1, 4))
     found: list[Candidate] = []
     least = 0.04 * max(binary.mask.shape)
     for index in range(len(contours)):
-        if tree[index, 3] >= 0:
+        if links[index, 3] >= 0:
             continue
         x, y, w, h = cv2.boundingRect(contours[index])
         if max(w, h) < least:
             continue
-        roi = _fill(contours, tree, index, (x, y, w, h))
+        roi = _fill(contours, links, index, (x, y, w, h))
         found.extend(_thin_parts(roi, (x, y), binary))
     found.sort(key=lambda item: -item.length_px)
     return found
@@ -197,7 +197,7 @@ def _trace(
     area = int(piece.sum())
     if area < 4.0 * LEAST_SLENDERNESS * half * half:
         return None
-    touching, contacts = _contact(piece, cv2.dilate(fat, np.ones((5, 5), np.uint8)))
+    touching, contacts = _contact(piece, _grown(fat))
     at_border, border_contacts = _contact(piece, _border(piece.shape, place, binary))
     root: Root = "free"
     seeds = None
@@ -235,8 +235,12 @@ def _contact(piece: Mask, other: Mask) -> tuple[Mask, int]:
     both = piece & other
     if not both.any():
         return both, 0
-    grown = cv2.dilate(both, np.ones((5, 5), np.uint8))
-    return both, cv2.connectedComponents(grown)[0] - 1
+    return both, cv2.connectedComponents(_grown(both))[0] - 1
+
+
+def _grown(mask: Mask) -> Mask:
+    """Grow a mask by two pixels."""
+    return np.asarray(cv2.dilate(mask, np.ones((5, 5), np.uint8)), dtype=np.uint8)
 
 
 def _border(shape: tuple[int, ...], place: tuple[int, int], binary: Binary) -> Mask:
@@ -256,9 +260,9 @@ def _level_sets(piece: Mask, seeds: Mask | None, half: float) -> Array | None:
     if half >= 3.0:
         size = 2 * int(0.35 * half) + 1
         kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
-        smooth = cv2.morphologyEx(piece, cv2.MORPH_OPEN, kernel) | (
-            piece & seeds if seeds is not None else 0
-        )
+        smooth = np.asarray(cv2.morphologyEx(piece, cv2.MORPH_OPEN, kernel), np.uint8)
+        if seeds is not None:
+            smooth = smooth | (piece & seeds)
     smooth = np.ascontiguousarray(smooth, dtype=np.uint8)
     if seeds is None:
         first = np.argmax(smooth)

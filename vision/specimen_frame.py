@@ -29,7 +29,7 @@ SPREAD = 1.1
 systematic parts that the synthetic frames have: of sampling in pixels, and the share of
 a shade's pull that is left after the correction. A side face that is seen has another
 grey value than the top: `SIDE_FACE` of its width is in doubt."""
-SAMPLING_PX = 0.002
+SAMPLING_PX = 0.0025
 SHADE_LEFT = 0.22
 SIDE_FACE = 0.07
 
