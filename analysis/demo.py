@@ -13,6 +13,7 @@ from .fit import try_fit
 from .load import load_run
 from .report import write_report
 from .twin_run import calibrate_twin, measure_twin, run_on_twin
+from .warm_up import is_warm, warm_up
 
 Tell = Callable[[str], None]
 
@@ -45,6 +46,9 @@ def run_demo(out: Path, *, seed: int, tell: Tell) -> Path:
     if not (out / "plan.toml").exists():
         write_templates(out, twin=True)
     plan = read_plan(out / "plan.toml")
+    if not is_warm():
+        tell("kernels  compiling the numerical kernels, once; about a minute")
+        warm_up()
     folder = _free_name(out)
     gaps = ", ".join(f"{gap_mm:g}" for gap_mm in plan.gaps_mm)
     tell(f"bench    {plan.specimen.name} on the twin bench, hidden truth {seed}")

@@ -1,0 +1,84 @@
+"""Compile the numerical kernels once, on two cores, into numba's cache.
+
+Numba compiles a kernel when it is first called and keeps the result. A first command
+would wait for that, one kernel after another; ``python -m magbend.analysis.warm_up``
+(and `make demo`) does it beforehand.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+
+def is_warm() -> bool:
+    """Return whether the largest kernels are in the cache, so that nothing compiles."""
+    from ..sim.planar import solve_planar
+    from ..sim.solid_march import solve_from
+    from ..vision.edges import _sample
+
+    for kernel in (solve_planar, solve_from, _sample):
+        cache = getattr(kernel, "_cache", None)
+        folder = Path(getattr(cache, "cache_path", ""))
+        if not any(folder.glob(f"*{kernel.py_func.__name__}-*.nbi")):
+            return False
+    return True
+
+
+def warm_up() -> None:
+    """Compile everything that `magbend demo` calls, in two processes."""
+    context = multiprocessing.get_context("spawn")
+    with context.Pool(2) as pool:
+        for result in [pool.apply_async(job) for job in (_rod, _photograph, _solid)]:
+            result.get()
+
+
+def _rod() -> None:
+    from .. import sim
+    from ..core.magnet import Magnet
+
+    near = sim.MagnetField(magnet=Magnet.cube(55.0, 1.3), gap_mm=60.0)
+    for field in (sim.UniformField(flux_mT=50.0), near):
+        sim.solve(sim.gmc(2), field)
+        sim.sensitivities(sim.gmc(2), field, parameters=("E_MPa[0]", "load_factor"))
+
+
+def _solid() -> None:
+    from .. import sim
+
+    sim.solve(sim.gmc(2), sim.UniformField(flux_mT=50.0), model="solid")
+
+
+def _photograph() -> None:
+    from ..core.centreline import Centreline
+    from ..vision import as_photo, extract
+    from ..vision.measurement import Pose
+    from ..vision.scene import Block, Scene, render_scene, scene_camera
+    from . import metrics
+
+    s = np.linspace(0.0, 30.0, 121)
+    arc = Centreline(
+        s_mm=s, x_mm=60.0 * np.sin(s / 60.0), y_mm=60.0 * (1.0 - np.cos(s / 60.0)),
+        theta_rad=s / 60.0, kappa_per_mm=np.full_like(s, 1.0 / 60.0),
+    )  # fmt: skip
+    camera = scene_camera()
+    clamp = Block(pose=Pose(x_mm=16.0, y_mm=-30.0, angle_deg=0.0, height_mm=0.9))
+    scene = Scene(clamp=clamp, centreline=arc)
+    picture = render_scene(scene, camera, np.random.default_rng(0))
+    measured = extract(as_photo(picture), camera, rod_height_mm=0.9, joints_mm=(10.0,))
+    metrics.shape_errors(measured.centreline() or arc, arc)
+
+
+def main(tell: Callable[[str], object] = sys.stderr.write) -> None:
+    """Compile what is not compiled yet."""
+    if not is_warm():
+        tell("compiling the numerical kernels (once, about a minute)\n")
+        warm_up()
+
+
+if __name__ == "__main__":
+    main()
