@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import print_json
+from .keys import terminating
 
 if TYPE_CHECKING:
     from ..rig.gap_stage import GapStage
@@ -226,8 +227,9 @@ def _connected(rig: Path, port: str | None, log: Path | None) -> Iterator[GapSta
     wire = WireLog(log, clock) if log else None
     stage = GapStage(make_stage(config, clock, log=wire), config, bounds, clock)
     try:
-        stage.connect()
-        yield stage
+        with terminating():
+            stage.connect()
+            yield stage
     finally:
         stage.close()
         if wire:
