@@ -8,15 +8,18 @@ photographs make its 27 comparisons.
 from __future__ import annotations
 
 import math
-import re
-from collections.abc import Sequence
+import multiprocessing
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..core.errors import StoreError
 from ..core.progress import Progress, silent
+from ..sim import gmc
 from .audit import audit_html, audit_paper
 from .compare import (
     RunComparison,
@@ -27,7 +30,8 @@ from .compare import (
 from .fit import FitResult, try_fit, write_fit
 from .load import load_run
 from .report import write_report
-from .report.figures import PANELS
+from .report.figures import PANELS, gmc_numbers
+from .twin_run import bench_run
 
 NUMBERS = (1, 2, 3, 4, 5, 6, 7)
 
@@ -84,7 +88,9 @@ class Reproduction:
         )
 
 
-def reproduce(out: Path, *, seed: int = 1, progress: Progress = silent) -> Reproduction:
+def reproduce(
+    out: Path, *, seed: int = 1, workers: int = 1, progress: Progress = silent
+) -> Reproduction:
     """Run the seven GMCs on the twin bench, compare, fit and report.
 
     Parameters
@@ -94,6 +100,8 @@ def reproduce(out: Path, *, seed: int = 1, progress: Progress = silent) -> Repro
         ``comparison.csv`` cover all.
     seed : int
         Of what the twin hides; rod n gets seed + n.
+    workers : int
+        Processes that run benches side by side.
     progress : callable
         Told after each rod and at the end.
 
@@ -102,15 +110,14 @@ def reproduce(out: Path, *, seed: int = 1, progress: Progress = silent) -> Repro
     StoreError
         If a run folder is there already.
     """
-    from ..sim import gmc
-    from .twin_run import bench_run
-
     out.mkdir(parents=True, exist_ok=True)
+    paths = [out / f"gmc{number}" for number in NUMBERS]
+    for path in paths:
+        if path.exists():
+            raise StoreError(f"{path} is there already; give a new folder with --out")
     runs: list[RunComparison] = []
     fits: list[FitResult | str] = []
-    for number in NUMBERS:
-        path = out / f"gmc{number}"
-        bench_run(path, specimen=gmc(number), seed=seed + number)
+    for path in _bench_runs(paths, seed=seed, workers=workers):
         run = compare_run(load_run(path))
         fit = try_fit(run.run)
         write_comparison(path / "comparison.csv", [run])
@@ -118,7 +125,7 @@ def reproduce(out: Path, *, seed: int = 1, progress: Progress = silent) -> Repro
             write_fit(path / "fit.json", fit)
         runs.append(run)
         fits.append(fit)
-        progress(number, len(NUMBERS) + 1)
+        progress(len(runs), len(NUMBERS) + 1)
     write_comparison(out / "comparison.csv", runs)
     files = write_report(
         runs,
@@ -132,15 +139,27 @@ def reproduce(out: Path, *, seed: int = 1, progress: Progress = silent) -> Repro
     return Reproduction(html=files.html, runs=tuple(runs), fits=tuple(fits))
 
 
-def gmc_numbers(runs: Sequence[RunComparison]) -> dict[int, RunComparison]:
-    """Return the runs by GMC number, empty unless a panel of the paper is complete."""
-    by_number: dict[int, RunComparison] = {}
-    for run in runs:
-        match = re.match(r"\s*GMC\s*([1-7])\b", run.run.specimen.name)
-        if match:
-            by_number.setdefault(int(match.group(1)), run)
-    complete = any(all(n in by_number for n in numbers) for _, numbers, _ in PANELS)
-    return by_number if complete else {}
+def _bench_runs(paths: Sequence[Path], *, seed: int, workers: int) -> Iterator[Path]:
+    """Run GMC 1 to 7 on the twin bench; yield the folders in order as they are done."""
+    jobs = [
+        (path, gmc(number), seed + number)
+        for path, number in zip(paths, NUMBERS, strict=True)
+    ]
+    if workers == 1:
+        for path, specimen, hidden in jobs:
+            bench_run(path, specimen=specimen, seed=hidden)
+            yield path
+        return
+    # Spawned, not forked: numba's and OpenCV's threads do not survive a fork.
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+        futures = [
+            (path, pool.submit(bench_run, path, specimen=specimen, seed=hidden))
+            for path, specimen, hidden in jobs
+        ]
+        for path, future in futures:
+            future.result()
+            yield path
 
 
 def _median(runs: Sequence[RunComparison], model: str) -> float:

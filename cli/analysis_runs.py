@@ -167,8 +167,8 @@ def report(
     """Write one self-contained HTML page, with the figures as PDF beside it."""
     from ..analysis.compare import write_comparison
     from ..analysis.fit import try_fit
-    from ..analysis.paper import gmc_numbers
     from ..analysis.report import write_report
+    from ..analysis.report.figures import gmc_numbers
 
     support = _support(clamp_angle_deg, gravity_m_s2, load_factor)
     done = _compared(runs, support, model)
@@ -225,13 +225,16 @@ def export(
 def paper(
     out: Path = typer.Option(Path("paper"), "--out", help="Folder for the runs."),
     seed: int = typer.Option(1, "--seed", help="Of the twin's hidden truth."),
+    workers: int = typer.Option(
+        2, "--workers", min=1, help="Benches that run side by side."
+    ),
     json: bool = _JSON,
 ) -> None:
     """Run the paper's seven GMCs at three fields on the twin bench, and report."""
     from ..analysis.paper import reproduce
 
     with progress("paper") as tell:
-        result = reproduce(out, seed=seed, progress=tell)
+        result = reproduce(out, seed=seed, workers=workers, progress=tell)
     if json:
         print_json(result.as_dict())
         return

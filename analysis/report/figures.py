@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -251,6 +252,17 @@ PANELS = (
     ("c  unit length", (2, 6, 7), ("10-10-10 mm", "20-5-5 mm", "5-5-20 mm")),
 )
 """The paper's comparison figure: panel, GMC numbers, what tells them apart."""
+
+
+def gmc_numbers(runs: Sequence[RunComparison]) -> dict[int, RunComparison]:
+    """Return the runs by GMC number, empty unless a panel of the paper is complete."""
+    by_number: dict[int, RunComparison] = {}
+    for run in runs:
+        match = re.match(r"\s*GMC\s*([1-7])\b", run.run.specimen.name)
+        if match:
+            by_number.setdefault(int(match.group(1)), run)
+    complete = any(all(n in by_number for n in numbers) for _, numbers, _ in PANELS)
+    return by_number if complete else {}
 
 
 def paper_figure(by_number: dict[int, RunComparison]) -> Figure:
