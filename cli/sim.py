@@ -12,7 +12,7 @@ from .console import group, print_json
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
-    from ..sim.fields import Field, Solution
+    from ..sim.fields import Field, Solution, Support
 
 app = group(
     "sim",
@@ -185,7 +185,7 @@ def _write(solution: Solution, rod: Specimen, out: Path) -> None:
 def _print(data: dict[str, Any]) -> None:
     typer.echo(f"{data['specimen']}, model {data['model']}: {data['status']}")
     if "tip_mm" in data:
-        x, y = data["tip_mm"]
+        x, y = (round(value, 5) + 0.0 for value in data["tip_mm"])
         typer.echo(f"  tip          ({x:.5f}, {y:.5f}) mm")
         typer.echo(f"  tip angle    {data['tip_angle_deg']:.5f} deg")
         typer.echo(f"  root moment  {data['root_moment_Nm']:.6g} N m")
@@ -195,7 +195,7 @@ def _print(data: dict[str, Any]) -> None:
         typer.echo(f"  branch ends  at {data['load_limit']:.4g} of the load")
     else:
         typer.echo("  touches the magnet at full load")
-    bx, by = data["flux_tip_mT"]
-    typer.echo(f"  flux at tip  ({bx + 0.0:.4f}, {by + 0.0:.4f}) mT")
+    bx, by = (round(value, 4) + 0.0 for value in data["flux_tip_mT"])
+    typer.echo(f"  flux at tip  ({bx:.4f}, {by:.4f}) mT")
     if "check_mm" in data:
         typer.echo(f"  check        least energy agrees to {data['check_mm']:.1e} mm")

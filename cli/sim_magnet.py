@@ -87,8 +87,9 @@ def _print(fit: MagnetFit, printed: list[dict[str, float]]) -> None:
     for reading in fit.readings:
         typer.echo(
             f"{reading.gap_mm:6.2f}  {reading.flux_mT:7.2f}  "
-            f"{reading.remanence_T:11.4f}  {reading.predicted_mT:12.2f}  {reading.residual_percent:+10.1f}"
-            f"  {reading.verdict}"
+            f"{reading.remanence_T:11.4f}  "
+            f"{reading.predicted_mT:12.2f}  {reading.residual_percent:+10.1f}  "
+            f"{reading.verdict}"
         )
     typer.echo(
         f"one remanence for all: {fit.remanence_T:.4f} +- {fit.remanence_sd_T:.4f} T"

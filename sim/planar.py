@@ -47,6 +47,10 @@ undeformed rod touches the magnet."""
 
 MAX_REACH = 200.0
 """Largest sum of h sqrt(e P), the length of the rod in units of its boundary layer."""
+MAX_REACH_NEWTON = 40.0
+"""The same where weight, a magnet or mixed signs need all three unknowns."""
+MAX_TRIALS = 400
+"""Most Newton runs along a branch; a branch that needs more is given up."""
 ORDER = 16
 STEP = 0.3
 ROUNDING = 2e-14
@@ -137,7 +141,11 @@ def straight(clamp, u):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def follow_load(rod, field, clamp, u, order, step, X, D, T, C):  # type: ignore[no-untyped-def]
-    """Follow the equilibrium from no load to full load; return (index or -1, load)."""
+    """Follow the equilibrium from no load to full load; return (index, load).
+
+    The index is -1 where the branch folds back, -2 where it takes too many steps.
+    """
+    trials = 0
     straight(clamp, u)
     load = 0.0
     jump = 0.25
@@ -161,6 +169,9 @@ def follow_load(rod, field, clamp, u, order, step, X, D, T, C):  # type: ignore[
             if trial >= 0 and abs(trial - index) <= 1:
                 break
             jump *= 0.5
+            trials += 1
+            if trials > MAX_TRIALS:
+                return -2, load
             if jump < MIN_LOAD_STEP:
                 u[:] = here
                 return -1, load
@@ -296,10 +307,11 @@ def equilibrium(rod, field, clamp, u, order, step, X, D, T, C):  # type: ignore[
     for i in range(rod.shape[0]):
         p = abs(rod[i, M]) * flux + math.hypot(rod[i, WX], rod[i, WY])
         reach += rod[i, H] * math.sqrt(rod[i, E] * p)
-    if not reach < MAX_REACH:
+    simple = one_sided(rod, field)
+    if not reach < (MAX_REACH if simple else MAX_REACH_NEWTON):
         return TOO_STRONG, -1, 0.0
     load = 1.0
-    if one_sided(rod, field):
+    if simple:
         index = bracketed(rod, field, clamp, u, order, step, X, D, T, C)
     else:
         index = newton(rod, field, 1.0, clamp, u, order, step, 1.0, X, D, T, C)
@@ -307,7 +319,7 @@ def equilibrium(rod, field, clamp, u, order, step, X, D, T, C):  # type: ignore[
             u[3] = 0.0
             index, load = follow_load(rod, field, clamp, u, order, step, X, D, T, C)
             if index < 0:
-                return GONE, -1, load
+                return (GONE if index == -1 else FAILED), -1, load
     if index < 0:
         return FAILED, -1, load
     return (OK_STABLE if index == 0 else OK_UNSTABLE), index, load

@@ -37,6 +37,8 @@ H, E, M, WX, WY = 0, 1, 2, 3, 4
 STATE = 9
 """Length of the state and rows of the column array."""
 MAX_ORDER = 24
+MOST_STEPS = 1500
+"""Most steps of a section; more is asked for only where an iteration runs away."""
 SERIES = 4
 """Series kept of a step: theta, q, sin, cos; and the same of every column."""
 
@@ -168,6 +170,8 @@ def substeps(h, X, step):  # type: ignore[no-untyped-def]
     p0 = math.hypot(X[4], X[5])
     p1 = math.hypot(X[4] + h * X[7], X[5] + h * X[8])
     z = h * math.sqrt(e * max(p0, p1) + 0.25 * e * e * X[1] * X[1])
+    if not z < MOST_STEPS * step:
+        return MOST_STEPS
     return max(1, math.ceil(z / step))
 
 

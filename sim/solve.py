@@ -131,8 +131,9 @@ def failure(
     if outcome == TOO_STRONG:
         return InputError(
             "the load on the rod (flux_mT, remanence_mT, weight) must be less than "
-            "40000 times its stiffness EI / L^2; instead received one beyond it: "
-            "check the units of E_MPa, side_mm and flux_mT"
+            "1600 times its stiffness EI / L^2, or 40000 times in a uniform field "
+            "without weight; instead received one beyond it: check E_MPa, side_mm and "
+            "flux_mT"
         )
     return SolverError(
         f"no equilibrium of {specimen.name!r} could be followed beyond "
