@@ -20,7 +20,14 @@ from ...core.centreline import Centreline
 from ...core.errors import InputError, StoreError
 from ...core.files import write_bytes
 from ..metrics import position_at
-from .build import MANIFEST, STATIONS, read_manifest, require_pyarrow
+from .build import (
+    MANIFEST,
+    ROW_GROUP,
+    STATIONS,
+    partition_path,
+    read_manifest,
+    require_pyarrow,
+)
 from .conditions import all_of, known, parse_range, parse_where
 
 Array = NDArray[np.float64]
@@ -101,7 +108,9 @@ def query(
             ranked, matched = _rank(data, condition, name, sort.startswith("-"), top)
         else:
             ranked, matched = _first(data, condition, top)
-        table = _fetch(data, ranked, "distance_mm" if nearest is not None else None)
+        table = _fetch(library, manifest, data, ranked)
+    if nearest is not None:
+        table = table.append_column("distance_mm", [ranked[:, 1]])
     return Found(
         table=table,
         matched=matched,
@@ -259,19 +268,25 @@ def _best(batches: Iterator[Any], key: Any, top: int) -> tuple[Array, int]:
     return best, matched
 
 
-def _fetch(data: Any, ranked: Array, extra: str | None) -> Any:
+def _fetch(library: Path, manifest: dict[str, Any], data: Any, ranked: Array) -> Any:
+    """Return all columns of designs, in their order; a design's place is its number."""
     import pyarrow as pa
-    import pyarrow.dataset as ds
+    import pyarrow.parquet as pq
 
-    ids = ranked[:, 0].astype(np.int64)
-    if len(ids) == 0:
-        table = data.schema.empty_table()
-        order = ids
-    else:
-        table = data.to_table(filter=ds.field("design").isin(pa.array(np.sort(ids))))
-        place = {int(d): i for i, d in enumerate(table.column("design").to_numpy())}
-        order = np.array([place[int(i)] for i in ids])
-    table = table.take(pa.array(order))
-    if extra is not None:
-        table = table.append_column(extra, pa.array(ranked[:, 1]))
-    return table
+    designs = ranked[:, 0].astype(np.int64)
+    if len(designs) == 0:
+        return data.schema.empty_table()
+    per_part = int(manifest["space"]["partition_rows"])
+    part, row = np.divmod(designs, per_part)
+    group, row = np.divmod(row, ROW_GROUP)
+    tables, places = [], []
+    for index in np.unique(part):
+        path = partition_path(library, int(index))
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            for number in np.unique(group[part == index]):
+                at = np.flatnonzero((part == index) & (group == number))
+                rows = file.read_row_group(int(number)).take(pa.array(row[at]))
+                tables.append(rows)
+                places.append(at)
+    table = pa.concat_tables(tables)
+    return table.take(pa.array(np.argsort(np.concatenate(places))))
