@@ -278,9 +278,9 @@ def _watching(devices: Devices, port: int | None) -> Iterator[Callable[[str], No
     if port is None:
         yield _report
         return
-    from ..rig.live_view import LiveStatus, live_view
+    from ..rig.live_view import LiveStatus, Watched, live_view
 
-    if not hasattr(devices.camera, "newest"):
+    if not isinstance(devices.camera, Watched):
         raise InputError("--live-port needs a camera or stream; files are not watched")
     status = LiveStatus()
 

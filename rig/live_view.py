@@ -12,7 +12,7 @@ import threading
 from collections.abc import Callable, Iterator
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from ..core.errors import RigError
 from .camera import Frame
@@ -35,6 +35,7 @@ tick();
 </script>"""
 
 
+@runtime_checkable
 class Watched(Protocol):
     """A camera whose newest picture can be looked at."""
 

@@ -119,7 +119,7 @@ def swallow(rig: Rig) -> None:
 CELLS: dict[str, tuple[Callable[[Rig], object], str, str]] = {
     "timeout: board silent": (in_move(silent), "fail", "silent"),
     "timeout: motor stalls": (
-        in_move(lambda r: setattr(r.board.mover, "stalled", True)), "fail", "did not reach"),
+        in_move(lambda r: setattr(r.board.mover, "stalled", True)), "fail", "reach"),
     "alarm 1: switch in motion": (in_move(stuck), "fail", "ALARM:1"),
     "alarm 1: switch standing": (standing(stuck), "fail", "stand|ALARM"),
     "alarm 2: soft limit": (standing(soft_limit), "fail", "stand|ALARM"),
