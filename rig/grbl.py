@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from ..core.errors import StageError
 from . import grbl_audit
 from .clock import Clock
-from .grbl_connect import connect_board
+from .grbl_connect import FoundBoard, connect_board
 from .grbl_motion import Target, await_arrival, await_homing, await_stand, stands
 from .grbl_protocol import (
     FEED_HOLD,
@@ -107,32 +107,36 @@ class GrblStage:
             If the port cannot be opened, nobody answers as GRBL, or a setting does not
             fit the rig file: the sentence names the setting.
         """
-        config = self._config
         self._disconnect()
         self._trust.lose()
-        port = resolve_port(config.port)
-        link = Link(
-            port, baud=config.baud, clock=self._clock, log=self._log, dtr=config.dtr
-        )
-        link.open()
-        presence = Presence(port)
-        presence.claim()
-        self._link, self._presence = link, presence
-        session = GrblSession(
-            link, self._clock, answer_timeout_s=config.answer_timeout_s
-        )
+        port = resolve_port(self._config.port)
+        session = self._open(port)
         try:
-            found = connect_board(session, self._clock, config)
-            problem = grbl_audit.audit(found.settings, config)
-            problem = problem or grbl_audit.audit_build(found.details, config)
+            found = connect_board(session, self._clock, self._config)
+            problem = grbl_audit.audit(found.settings, self._config)
+            problem = problem or grbl_audit.audit_build(found.details, self._config)
             if problem:
                 raise StageError(f"the stage on {port} does not fit: {problem}")
         except BaseException:
             self._disconnect()
             raise
         self._session = session
-        self._trust.watch(session)
-        self._limits = grbl_audit.limits_of(found.settings, config)
+        self._take_in(session, found, port)
+
+    def _open(self, port: str) -> GrblSession:
+        config = self._config
+        self._link = Link(
+            port, baud=config.baud, clock=self._clock, log=self._log, dtr=config.dtr
+        )
+        self._link.open()
+        self._presence = Presence(port)
+        self._presence.claim()
+        timeout_s = config.answer_timeout_s
+        return GrblSession(self._link, self._clock, answer_timeout_s=timeout_s)
+
+    def _take_in(self, session: GrblSession, found: FoundBoard, port: str) -> None:
+        """Keep what the board said; believe its position if nobody disturbed it."""
+        self._limits = grbl_audit.limits_of(found.settings, self._config)
         self._identity = StageIdentity(
             driver="grbl",
             firmware=found.banner,
@@ -141,14 +145,11 @@ class GrblStage:
             settings=found.settings,
             notes=tuple(grbl_audit.notes(found.settings)),
         )
+        self._trust.watch(session)
         self._undisturbed = found.undisturbed
-        left_at = presence.recall()
-        step_mm = self._limits.step_mm
-        if (
-            left_at
-            and found.undisturbed
-            and self._trust.is_at(session, left_at, step_mm)
-        ):
+        left_at = self._presence.recall() if self._presence else None
+        where = left_at if found.undisturbed else None
+        if where and self._trust.is_at(session, where, self._limits.step_mm):
             self._trust.confirm(session)
 
     def home(self) -> None:
@@ -383,17 +384,7 @@ class GrblStage:
         feed_mm_min: float,
         moved: Moved,
     ) -> None:
-        start = self._machine_mm()
-        distance = abs(target_mm - start) if start is not None else 0.0
-        limit_s = _MARGIN_S + self._config.busy_factor * self.limits.duration_s(
-            distance, feed_mm_min
-        )
-        target = Target(
-            axis=self._axis,
-            machine_mm=target_mm,
-            tolerance_mm=1.01 * self.limits.step_mm,
-            limit_s=limit_s,
-        )
+        target = self._target(target_mm, feed_mm_min)
         restarts = session.restarts
         try:
             session.command(jog_line(self._config.axis, target_mm, feed_mm_min))
@@ -425,6 +416,18 @@ class GrblStage:
         except StageTimeoutError as error:
             self._give_up(error)
         self._trust.stands(session)
+
+    def _target(self, target_mm: float, feed_mm_min: float) -> Target:
+        """Return where to, how exactly, and how long it may take."""
+        start = self._machine_mm()
+        distance = 0.0 if start is None else abs(target_mm - start)
+        usual_s = self.limits.duration_s(distance, feed_mm_min)
+        return Target(
+            axis=self._axis,
+            machine_mm=target_mm,
+            tolerance_mm=1.01 * self.limits.step_mm,
+            limit_s=_MARGIN_S + self._config.busy_factor * usual_s,
+        )
 
     def _give_up(self, error: StageTimeoutError) -> None:
         """Bring the stage to a stand after a timeout, and say so."""
