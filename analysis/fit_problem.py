@@ -26,9 +26,10 @@ from .metrics import position_at
 
 Array = NDArray[np.float64]
 
-SIGMA_FLOOR_MM = 0.002
-"""Least standard deviation of a measured point: below it the camera's pixels, the
-paper and the lens model decide, which no centreline knows of."""
+SIGMA_FLOOR_MM = {"magnet": 0.002, "uniform": 0.1}
+"""Least standard deviation of a measured point, by field model. Before the magnet's
+field the camera's pixels, the paper and the lens decide, which no centreline knows of;
+a uniform field is itself wrong by tenths of a millimetre."""
 
 WALL = 1e3
 """Residual of every point where the rod has no equilibrium."""
@@ -269,7 +270,7 @@ def _shot(
             }
         ),
         normals=np.column_stack([-np.sin(theta), np.cos(theta)]),
-        sd_mm=np.hypot(sigma[inside], SIGMA_FLOOR_MM),
+        sd_mm=np.hypot(sigma[inside], SIGMA_FLOOR_MM[model]),
     )
 
 

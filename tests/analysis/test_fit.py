@@ -198,6 +198,15 @@ def test_widening_a_prior_widens_the_intervals(tmp_path: Path) -> None:
     assert wide.E_sd_MPa[0] / wide.E_MPa[0] > 0.045
 
 
+def test_uniform_field_shifts_the_moduli(tmp_path: Path) -> None:
+    """The paper's assumption predicts too much bending, so it finds a stiffer rod."""
+    run = load_run(write_run(tmp_path / "a", sigma_mm=0.005))
+    uniform, magnet = fit_runs([run], model="uniform"), fit_runs([run])
+    assert magnet.E_MPa[0] == pytest.approx(20.0, rel=0.05)
+    assert uniform.E_MPa[0] > 1.05 * magnet.E_MPa[0]
+    assert uniform.E_sd_MPa[0] > magnet.E_sd_MPa[0]
+
+
 def test_failed_frames_are_left_out_and_named(tmp_path: Path) -> None:
     run = load_run(write_run(tmp_path / "a", failed=[0]))
     fit = fit_runs([run])
