@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +46,9 @@ class Discretisation:
 
 def lobatto(degree: int) -> Array:
     """Gauss-Lobatto points: ends, and extrema of the Legendre polynomial."""
-    inner = np.polynomial.Legendre.basis(degree).deriv().roots() if degree > 1 else []
+    inner: Any = (
+        np.polynomial.Legendre.basis(degree).deriv().roots() if degree > 1 else []
+    )
     return np.concatenate([[-1.0], np.real(inner), [1.0]])
 
 

@@ -114,7 +114,8 @@ class SpatialSolution:
 
     def _turn(self) -> Array:
         """Darboux vector in the specimen frame, shape (n, 3)."""
-        return np.einsum("nk,nki->ni", self.curvature_per_mm, self.directors)
+        turn: Array = np.einsum("nk,nki->ni", self.curvature_per_mm, self.directors)
+        return turn
 
     def to_csv(self) -> str:
         """Return the shape as CSV: s, x, y, z, tangent, curvatures; 15 digits."""
