@@ -44,8 +44,8 @@ def draw_study(path: Path, name: str, shapes: Sequence[Shape], *, title: str) ->
         label = f"{shape.value} {study.unit}"
         if line is None or shape.solution.morse_index > 0:
             label += f" ({shape.solution.status})"
-        x, y = ([], []) if line is None else (line.x_mm, line.y_mm)
-        axes.plot(x, y, color=colour, label=label, linewidth=1.8)
+        points = np.empty((0, 2)) if line is None else line.points_mm
+        axes.plot(*points.T, color=colour, label=label, linewidth=1.8)
     axes.plot([0.0], [0.0], "s", color="0.2", markersize=6)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("x in mm")

@@ -1,0 +1,198 @@
+"""``magbend sim``: what is typed, what is printed, what is written."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from magbend.cli import main, sim
+from magbend.core.centreline import Centreline
+from magbend.core.errors import ConfigError, InputError, SolverError
+from magbend.core.specimen_file import read_specimen
+from magbend.sim import UniformField, gmc
+from magbend.sim.sweep import STUDIES, sweep
+
+SPECIMENS = Path(__file__).resolve().parents[2] / "fixtures" / "specimens"
+RUN = CliRunner()
+
+
+def run(*arguments: str) -> str:
+    """Run ``magbend sim`` and return its output; errors come out as exceptions."""
+    result = RUN.invoke(sim.app, list(arguments), standalone_mode=False)
+    if result.exception is not None:
+        raise result.exception
+    return result.stdout
+
+
+def test_shape_prints_the_reference_tip() -> None:
+    text = run("shape", "--gmc", "2", "--field-mT", "50", "--angle-deg", "90")
+    assert "(29.53532, 4.70952) mm" in text
+    assert "stable" in text
+
+
+def test_shape_writes_twelve_digits_and_json(tmp_path: Path) -> None:
+    out = tmp_path / "shape.csv"
+    text = run("shape", "--gmc", "2", "--field-mT", "50", "--out", str(out), "--json")
+    data = json.loads(text)
+    line = Centreline.from_csv(out)
+    assert len(line.s_mm) == 61
+    assert line.tip_mm == pytest.approx((29.5353236353478, 4.70952405678937), abs=1e-12)
+    assert data["tip_mm"] == pytest.approx(line.tip_mm, abs=1e-13)
+    assert data["status"] == "stable"
+    assert len(data["s_mm"]) == 61
+
+
+def test_specimen_file_is_the_table(tmp_path: Path) -> None:
+    for number in range(1, 8):
+        path = SPECIMENS / f"gmc{number}.toml"
+        assert read_specimen(path) == gmc(number)
+    text = run("shape", "--specimen", str(path), "--field-mT", "50", "--json")
+    same = run("shape", "--gmc", "7", "--field-mT", "50", "--json")
+    assert json.loads(text)["tip_mm"] == json.loads(same)["tip_mm"]
+
+
+def test_magnet_weight_and_check(tmp_path: Path) -> None:
+    magnet = tmp_path / "magnet.toml"
+    magnet.write_text("side_mm = 55.0\nremanence_T = 1.305\n")
+    text = run(
+        "shape", "--gmc", "2", "--magnet", str(magnet), "--gap-mm", "60", "--verify",
+        "--density-kg-m3", "2640", "--gravity-m-s2", "0", "-9.80665", "0", "--json",
+    )  # fmt: skip
+    data = json.loads(text)
+    assert data["tip_mm"][1] == pytest.approx(2.714, abs=2e-3)
+    assert data["check_mm"] < 1e-8
+
+
+def test_pulled_in_has_no_shape_to_write(tmp_path: Path) -> None:
+    rod = tmp_path / "rod.toml"
+    rod.write_text(
+        'name = "soft"\nside_mm = 0.75\nremanence_mT = -150\n'
+        "[[section]]\nlength_mm = 30\nE_MPa = 10\n"
+    )
+    magnet = tmp_path / "magnet.toml"
+    magnet.write_text("side_mm = 55.0\nremanence_T = 1.305\n")
+    case = ("shape", "--specimen", str(rod), "--magnet", str(magnet), "--gap-mm", "20")
+    assert "pulled in: no equilibrium" in run(*case)
+    out = tmp_path / "shape.csv"
+    with pytest.raises(SolverError, match="no shape to write"):
+        run(*case, "--out", str(out))
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (),
+        ("--gmc", "2"),
+        ("--gmc", "2", "--specimen", "x.toml", "--field-mT", "5"),
+        ("--gmc", "2", "--field-mT", "5", "--magnet", "m.toml"),
+        ("--gmc", "2", "--magnet", "m.toml"),
+        ("--gmc", "2", "--field-mT", "5", "--gap-mm", "5"),
+        ("--gmc", "2", "--field-mT", "5", "--points", "3"),
+        ("--gmc", "two", "--field-mT", "5"),
+    ],
+)
+def test_wrong_usage_ends_with_2(arguments: tuple[str, ...]) -> None:
+    result = RUN.invoke(sim.app, ["shape", *arguments])
+    assert result.exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "pattern"),
+    [
+        (("--gmc", "9", "--field-mT", "5"), "GMC number"),
+        (("--gmc", "2", "--field-mT", "100000"), r"flux_mT.*mT"),
+        (("--gmc", "2", "--field-mT", "nan"), r"flux_mT.*mT"),
+        (
+            ("--gmc", "2", "--field-mT", "5", "--gravity-m-s2", "0", "-9", "0"),
+            "density",
+        ),
+        (("--specimen", "missing.toml", "--field-mT", "5"), "no such file"),
+    ],
+)
+def test_mistakes_are_sentences(arguments: tuple[str, ...], pattern: str) -> None:
+    with pytest.raises((InputError, ConfigError), match=pattern):
+        run("shape", *arguments)
+
+
+def test_the_sentence_is_printed_and_the_exit_code_is_1(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("MAGBEND_DEBUG", raising=False)
+    monkeypatch.setattr(
+        sys, "argv", ["magbend", "sim", "shape", "--gmc", "9", "--field-mT", "5"]
+    )
+    with pytest.raises(SystemExit) as stop:
+        main.main()
+    assert stop.value.code == 1
+    assert "GMC number must be from 1 to 7" in capsys.readouterr().err
+
+
+def test_magnet_prints_the_verdicts(tmp_path: Path) -> None:
+    figure = tmp_path / "map.svg"
+    text = run("magnet", "--map", str(figure))
+    for part in ("1.3578", "1.3050", "1.2186", "1.2938", "70.07"):
+        assert part in text
+    assert figure.read_text(encoding="utf-8").lstrip().startswith("<?xml")
+    readings = tmp_path / "readings.csv"
+    readings.write_text("gap_mm,flux_mT\n70,38\n60,50\n")
+    data = json.loads(run("magnet", str(readings), "--json"))
+    assert len(data["readings"]) == 2
+    assert data["remanence_T"] == pytest.approx(1.331, abs=2e-3)
+    assert "paper" not in data
+
+
+def test_sweep_writes_a_figure_and_a_table_each(tmp_path: Path) -> None:
+    out = tmp_path / "studies"
+    text = run("sweep", "--out", str(out))
+    for name in STUDIES:
+        assert (out / f"{name}.svg").stat().st_size > 1000
+        assert (out / f"{name}.pdf").read_bytes().startswith(b"%PDF")
+        rows = (out / f"{name}.csv").read_text(encoding="utf-8").splitlines()
+        assert len(rows) == 1 + 61 * len(STUDIES[name].values)
+        assert name in text
+
+
+def test_sweep_takes_values(tmp_path: Path) -> None:
+    text = run("sweep", "field", "--values", "10, 20", "--out", str(tmp_path), "--json")
+    shapes = json.loads(text)["shapes"]
+    assert [shape["value"] for shape in shapes] == ["10", "20"]
+    assert shapes[1]["tip_mm"][1] > shapes[0]["tip_mm"][1]
+
+
+def test_studies_bend_the_way_the_paper_says() -> None:
+    # A larger field, a softer rod, a longer soft end and a thinner rod bend more.
+    field = UniformField(flux_mT=50.0)
+    for name in ("field", "stiffness", "length", "side"):
+        lines = [shape.solution.centreline for shape in sweep(name, gmc(2), field)]
+        angles = [line.theta_rad[-1] for line in lines if line is not None]
+        assert np.all(np.diff(angles) > 0.0), name
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("field", "much"), ("stiffness", "0"), ("length", "10-10"), ("side", "-1")],
+)
+def test_bad_values_of_a_study_are_refused(name: str, value: str) -> None:
+    with pytest.raises(InputError):
+        sweep(name, gmc(2), UniformField(flux_mT=50.0), values=[value])
+
+
+def test_shape_loads_little() -> None:
+    code = (
+        "import sys; from magbend.cli.main import app\n"
+        "sys.argv = 'magbend sim shape --gmc 2 --field-mT 50'.split()\n"
+        "try:\n    app()\nexcept SystemExit:\n    pass\n"
+        "heavy = ('scipy.optimize', 'pandas', 'matplotlib', 'pydantic', 'rich')\n"
+        "print([name for name in heavy if name in sys.modules])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.splitlines()[-1] == "[]"
