@@ -190,21 +190,28 @@ def test_a_stage_fault_ends_the_run_by_name_and_is_mended(
         mend_and_resume(rig, out)
 
 
-@pytest.mark.parametrize("code", [8, 9])
+def lose_switches(rig: Rig) -> None:
+    rig.board.plant._high_mm = 1e9
+
+
+@pytest.mark.parametrize(
+    ("strike", "reason"),
+    [(stuck, "ALARM:8"), (lose_switches, "ALARM:9")],
+    ids=["alarm 8", "alarm 9"],
+)
 def test_homing_that_fails_ends_the_run_before_any_step(
-    code: int, plan_file: Path, tmp_path: Path
+    strike: Callable[[Rig], None], reason: str, plan_file: Path, tmp_path: Path
 ) -> None:
     rig = Rig(read_plan(plan_file))
     devices = rig.open()
-    if code == 8:
-        rig.board.plant.stuck = True
-    else:
-        rig.board.mover.stalled = True
+    strike(rig)
     out = tmp_path / "out"
     summary = run(rig.plan, devices, out, twin=True)
     devices.close()
-    print(f"alarm {code} in homing: {summary.status}, {summary.reason}")
+    print(f"homing: {summary.status}, {summary.reason}")
     assert (summary.status, summary.steps_done) == ("fail", 0)
+    assert reason in summary.reason
+    rig.board = twin_board()  # switch repaired, carriage pushed back by hand
     mend_and_resume(rig, out)
 
 
