@@ -9,6 +9,7 @@ others, and each solved again by itself, with the digits that are printed.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -138,7 +139,7 @@ def _relative(goal: Goal, limit: float) -> float:
     if goal.kind in ("radius", "angle"):
         return limit / 100.0
     length_mm = goals.curve_length_mm(goal)
-    return limit / (length_mm or max(np.hypot(*goal.wanted), 1.0))
+    return limit / (length_mm or max(math.hypot(*goal.wanted), 1.0))
 
 
 def _evaluate(

@@ -164,9 +164,13 @@ def achieved(goal: Goal, shapes: Array) -> Array:
         angle: Array = np.degrees(shapes[:, -1, 3])
         return angle
     if goal.kind == "tip":
-        return np.hypot(*(shapes[:, -1, 1:3] - np.array(goal.wanted)).T)
+        distance: Array = np.hypot(*(shapes[:, -1, 1:3] - np.array(goal.wanted)).T)
+        return distance
+    if goal.curve_mm is None:
+        raise InputError("a curve goal must have a curve")
     away = shapes[:, :, 1:3] - goal.curve_mm
-    return np.sqrt(np.mean(np.sum(away**2, axis=2), axis=1))
+    rms: Array = np.sqrt(np.mean(np.sum(away**2, axis=2), axis=1))
+    return rms
 
 
 def error_of(goal: Goal, value: float) -> float:

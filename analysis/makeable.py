@@ -131,9 +131,9 @@ def dimension(makeable: Makeable) -> int:
 
 def choices(makeable: Makeable) -> list[tuple[Recipe | None, float | None]]:
     """Return every pair of recipe and mould; None stands for a free choice."""
-    return list(
-        itertools.product(makeable.recipe or [None], makeable.sides_mm or [None])
-    )
+    recipes: list[Recipe | None] = [*makeable.recipe] or [None]
+    moulds: list[float | None] = [*makeable.sides_mm] or [None]
+    return list(itertools.product(recipes, moulds))
 
 
 def rods(makeable: Makeable, candidates: Candidates) -> dict[str, Array]:

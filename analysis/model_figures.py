@@ -60,7 +60,11 @@ def save_figure(figure: Any, path: Path) -> None:
     check_path(path)
     kind = path.suffix.lower()[1:]
     dates = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}
-    settings = {"pdf.fonttype": 42, "svg.hashsalt": "magbend", "svg.fonttype": "none"}
+    settings: Any = {
+        "pdf.fonttype": 42,
+        "svg.hashsalt": "magbend",
+        "svg.fonttype": "none",
+    }
     buffer = io.BytesIO()
     with mpl.rc_context(settings):
         figure.savefig(buffer, format=kind, metadata=dates[kind], dpi=200)

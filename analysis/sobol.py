@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,12 +101,12 @@ def sensitivity(
         positive(flux, "flux_mT", "mT")
     samples = int(within(samples, 64, 2**20, "samples", ""))
     samples = 1 << (samples - 1).bit_length()
-    dists = [uniform(low, high - low) for low, high in PARAMETERS.values()]
+    dists: Any = [uniform(low, high - low) for low, high in PARAMETERS.values()]
     first, total, sd = [], [], []
     for done, flux in enumerate(fields_mT, start=1):
         rng = np.random.default_rng(seed)
         found = sobol_indices(
-            func=lambda p, flux=flux: _outputs(p, flux), n=samples, dists=dists, rng=rng
+            func=partial(_outputs, flux_mT=flux), n=samples, dists=dists, rng=rng
         )
         spread = found.bootstrap(
             confidence_level=0.95, n_resamples=_RESAMPLES

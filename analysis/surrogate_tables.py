@@ -199,12 +199,13 @@ def load_correction(path: Path) -> Correction:
 
 
 def _points(designs: Designs) -> int:
-    k = designs.length_mm.shape[1]
+    k = int(designs.length_mm.shape[1])
     return 2 * k * ((POINTS - 1) // (2 * k)) + 1
 
 
 def _rod(design: Designs) -> Array:
-    shape = solve_shapes(design, points=_points(design), by_section=True).points[0]
+    solved = solve_shapes(design, points=_points(design), by_section=True)
+    shape: Array = solved.points[0]
     if not np.isfinite(shape[-1, 1]):
         raise InputError("an imported case has no equilibrium of the rod")
     return shape

@@ -87,7 +87,7 @@ def design(
         radius_mm, tip_mm, tip_angle_deg, curve, polyline, calibration, rod_height_mm
     )
     field = _field(flux_mT, field_angle_deg, magnet, gap_mm)
-    options = {
+    options: dict[str, object] = {
         "total_length_mm": _range(length_mm, "--length-mm"),
         "side_mm": _range(side_mm, "--side-mm"),
         "E_MPa": _range(E_MPa, "--E-MPa"),

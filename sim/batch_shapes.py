@@ -27,13 +27,12 @@ from .planar import (
     GONE,
     OK_STABLE,
     OK_UNSTABLE,
-    STATE,
     equilibrium,
     shape,
     sharpen,
     touches,
 )
-from .planar_march import MAX_ORDER
+from .planar_march import MAX_ORDER, STATE
 
 Array = NDArray[np.float64]
 

@@ -217,7 +217,7 @@ def _rank(
         column = batch.column(name)
         if hasattr(column, "dictionary"):
             raise InputError(f"--sort cannot rank by {name!r}, which is no number")
-        values = column.to_numpy(zero_copy_only=False).astype(np.float64)
+        values: Array = column.to_numpy(zero_copy_only=False).astype(np.float64)
         return -values if falling else values
 
     return _best(_batches(data, ["design", name], condition), key, top)

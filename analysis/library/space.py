@@ -45,9 +45,11 @@ class Axis:
     def pick(self, u: Array) -> Array:
         """Return values for coordinates from 0 to 1."""
         if self.is_range:
-            return self.low + u * (self.high - self.low)
+            spread: Array = self.low + u * (self.high - self.low)
+            return spread
         index = np.minimum((u * len(self.values)).astype(int), len(self.values) - 1)
-        return np.array(self.values)[index]
+        listed: Array = np.array(self.values)[index]
+        return listed
 
 
 def _parse_axis(value: Any) -> Axis:
@@ -177,7 +179,8 @@ class Space(FileModel):
         rows = _product([s.length_mm for s in self.section], "lengths")
         if self.total_length_mm is None:
             return rows
-        return rows[np.abs(rows.sum(axis=1) - self.total_length_mm) < 1e-9]
+        fitting: Array = rows[np.abs(rows.sum(axis=1) - self.total_length_mm) < 1e-9]
+        return fitting
 
     @cached_property
     def modulus_rows(self) -> Array:
@@ -185,7 +188,8 @@ class Space(FileModel):
         rows = _product([s.E_MPa for s in self.section], "moduli")
         if not self.falling_E:
             return rows
-        return rows[np.all(np.diff(rows, axis=1) <= 0.0, axis=1)]
+        falling: Array = rows[np.all(np.diff(rows, axis=1) <= 0.0, axis=1)]
+        return falling
 
     @property
     def load_axis(self) -> Axis:
