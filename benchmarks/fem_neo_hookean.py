@@ -239,7 +239,7 @@ class Beam:
 
     def bend(self, shape, side_mm):
         """Start from the cross-sections of a rod's shape."""
-        s, (x, y, z) = shape.s_mm, self.X0.T
+        s, (x, y, _) = shape.s_mm, self.X0.T
         r = CubicSpline(s, shape.points_mm)(x)
         angle = CubicSpline(s, shape.theta_rad)(x)
         ramp = 1 - np.exp(-x / (0.3 * side_mm))
