@@ -165,7 +165,8 @@ def _rough_end(
         return None
     start = s < expected - reach - near
     rod = float(np.nanmedian(profile[start])) if (finite & start).any() else np.nan
-    paper = float(np.nanquantile(profile[s > expected], 0.75))
+    beyond = profile[finite & (s > expected)]
+    paper = float(np.quantile(beyond, 0.75)) if beyond.size else np.nan
     if not paper > rod:
         return None
     above = (profile > 0.5 * (rod + paper)) & (s >= expected - reach)
