@@ -217,7 +217,7 @@ def _steps(table: Array, flux: Array, tip: Array) -> float:
             "E_MPa, remanence_mT and flux"
         )
     turns = float(np.linalg.norm(table[:, K1 : K3 + 1], axis=1) @ table[:, H])
-    return 5.0 + 5.0 * reach + 4.0 * turns
+    return 5.0 + 9.0 * reach + 4.0 * turns
 
 
 def _margin(rod: SpatialRod) -> float:
