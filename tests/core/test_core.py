@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from magbend.core.centreline import Centreline
 from magbend.core.errors import ConfigError, InputError
 from magbend.core.magnet import Magnet

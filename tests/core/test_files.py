@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+
 from magbend.core.errors import ConfigError
 from magbend.core.files import write_bytes
 from magbend.core.specimen_file import (
