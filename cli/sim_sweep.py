@@ -90,7 +90,7 @@ def sweep(
         return
     for row in rows:
         tip = row["tip_mm"]
-        where = f"tip ({tip[0]:8.4f}, {tip[1]:8.4f}) mm" if tip else ""
+        where = "tip ({:8.4f}, {:8.4f}) mm".format(*tip) if tip else ""
         typer.echo(
             f"{row['study']:10s} {row['value']:>10s} {row['unit']:8s} {where}  "
             f"{row['status']}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import tomllib
+from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
@@ -31,6 +32,25 @@ def test_every_package_folder_is_installed() -> None:
         for init in (ROOT / package).rglob("__init__.py")
     }
     assert listed == on_disk
+
+
+def test_every_data_file_of_a_package_is_installed() -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    tables = settings["tool"]["setuptools"]
+    data = tables["package-data"]
+    folders = {ROOT / path: name for name, path in tables["package-dir"].items()}
+    for path in tracked():
+        top = ROOT / path.relative_to(ROOT).parts[0]
+        if top not in folders or path.suffix == ".py":
+            continue
+        packages = [
+            folder for folder in path.parents if (folder / "__init__.py").is_file()
+        ]
+        inside = path.relative_to(packages[0]).as_posix()
+        name = "magbend." + ".".join(packages[0].relative_to(ROOT).parts)
+        patterns = [*data["*"], *data.get(name, ())]
+        same_depth = [p for p in patterns if p.count("/") == inside.count("/")]
+        assert any(fnmatch(inside, pattern) for pattern in same_depth), path
 
 
 def test_no_file_names_a_package_index_or_a_path_of_a_machine() -> None:
