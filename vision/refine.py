@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from .centreline_fit import SHARED, Curve, CurveFit, fit_curve
 from .clamp import ClampLines, find_clamp
 from .edges import Edges, find_edges
+from .joints import find_joints
 from .rod import Root
 from .tip import EndFace, find_tip
 from .track import Start
@@ -288,6 +289,11 @@ def _fit(
         "joints": joints(curve),
         "shared": 3.0 if supple else SHARED,
     }
+    if not supple and not options["joints"]:
+        options["joints"] = find_joints(
+            s - first, theta, np.where(used, offset, 0.0), weights,
+            width=width, shared=SHARED,
+        )  # fmt: skip
     fit = fit_curve(s - first, measured, weights, theta=theta, **options)  # type: ignore[arg-type]
     if turn >= 2:
         outlying = np.abs(np.nan_to_num(fit.residual)) > 4.0 * fit.noise + 1e-3

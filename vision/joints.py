@@ -1,0 +1,220 @@
+"""Where the curvature of a rod jumps: the joints of its sections, found in the picture.
+
+A curve smooth enough for the sections is too stiff for the joints, and one supple
+enough for the joints follows every shade beside the clamp, where shade turns the
+direction of the rod. So joints are looked for first. The measured offsets are linear in
+the change of theta(s): a smooth part with the penalty on theta''' of `centreline_fit`,
+and for each joint a jump of curvature and of its slope, with a broad Gaussian prior.
+Joints are added one by one while the marginal likelihood (evidence, at its maximum over
+the weight of the penalty) grows by more than the choice among places explains.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_THIN = 4
+_PIECES = 16
+_MOST = 4
+_LEAST_GAIN = 4.0
+"""Gain of twice the log evidence for a joint to be believed, beyond the choice among
+the places two widths apart where it might be."""
+_ENDS = 3.0
+"""Widths next to either end where a jump could not be told from shade."""
+_APART = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Model:
+    """Linear model of the offsets: columns, their prior precision, and the data."""
+
+    s: Array
+    normals: Array
+    weight: Array
+    offset: Array
+    smooth: Array
+    bend: Array
+    count: float
+    shared: float
+
+
+def find_joints(
+    s: Array, theta: Array, offset: Array, weights: Array, *, width: float,
+    shared: float,
+) -> list[float]:  # fmt: skip
+    """Find the joints of a rod.
+
+    Parameters
+    ----------
+    s : ndarray, shape (n,)
+        Even grid of arc length, px.
+    theta : ndarray, shape (n,)
+        Tangent angle of the curve that the offsets were measured from.
+    offset : ndarray, shape (n,)
+        Normal distance of the measured axis from that curve.
+    weights : ndarray, shape (n,)
+        0 where nothing was measured.
+    width : float
+        Width of the rod: joints next to the ends or to each other are not looked for.
+    shared : float
+        Neighbouring stations that count as one.
+
+    Returns
+    -------
+    list of float
+        Arc lengths of the joints, rising; empty for a smooth rod.
+    """
+    model = _model(s, theta, offset, weights, shared)
+    places = np.arange(s[0] + _ENDS * width, s[-1] - _ENDS * width, 0.25 * width)
+    joints: list[float] = []
+    if len(places) < 3:
+        return joints
+    choice = 2.0 * np.log(max(0.125 * len(places), 1.0))
+    level = -_gains(model, joints, None)[0]
+    while len(joints) < _MOST:
+        free = _free(places, joints, _APART * width)
+        if not free.size:
+            break
+        found = -_gains(model, joints, free)
+        best = int(np.argmin(found))
+        if level - found[best] < _LEAST_GAIN + choice:
+            break
+        joints = _settled(model, [*joints, float(free[best])], 0.25 * width)
+        level = -_gains(model, joints, None)[0]
+    return sorted(joints)
+
+
+def _free(places: Array, joints: list[float], apart: float) -> Array:
+    for joint in joints:
+        places = places[np.abs(places - joint) > apart]
+    return places
+
+
+def _settled(model: _Model, joints: list[float], step: float) -> list[float]:
+    """Move each joint to its likeliest place near by, the others held."""
+    reaches = (6.0, 1.0) if len(joints) > 1 else (1.0,)
+    for reach in reaches:
+        for k in range(len(joints)):
+            rest = joints[:k] + joints[k + 1 :]
+            near = joints[k] + step * reach * np.linspace(-1.0, 1.0, 13)
+            near = near[(near > 4.0 * step) & (near < model.s[-1] - 4.0 * step)]
+            joints[k] = float(near[int(np.argmax(_gains(model, rest, near)))])
+    return joints
+
+
+def _model(
+    s: Array, theta: Array, offset: Array, weights: Array, shared: float
+) -> _Model:
+    """Thin the stations and set up the smooth part: quadratic plus hinges in theta."""
+    count = len(s) // _THIN * _THIN
+    weight = weights[:count].reshape(-1, _THIN).sum(axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = (offset * weights)[:count].reshape(-1, _THIN).sum(axis=1) / weight
+    at = s[:count].reshape(-1, _THIN).mean(axis=1)
+    angle = theta[:count].reshape(-1, _THIN).mean(axis=1)
+    normals = np.column_stack([-np.sin(angle), np.cos(angle)])
+    length = s[-1] - s[0]
+    u = (at - s[0]) / length
+    edges = np.linspace(0.0, 1.0, _PIECES + 1)
+    # theta as 1, u, u^2 and (u - edge)^3 over each piece: theta''' is constant there.
+    rise = np.clip(u[:, None] - edges[:-1], 0.0, None) ** 3
+    angles = np.column_stack([np.ones_like(u), u, u**2, rise])
+    smooth = np.column_stack([normals @ normals[0], _moved(angles, at, normals)])
+    # The third derivative of piece k is 6 times the sum of the first k coefficients.
+    sums = np.tril(np.ones((_PIECES, _PIECES)))
+    bend = np.zeros((smooth.shape[1],) * 2)
+    bend[4:, 4:] = sums.T @ sums
+    data = np.where(weight > 0.0, np.nan_to_num(mean), 0.0)
+    # Offsets count from a curve that is bent itself: give the model that curve too.
+    start = np.linalg.lstsq(angles, angle, rcond=None)[0]
+    data = data + smooth[:, 1:] @ start
+    data = data + _moved((angle - angles @ start)[:, None], at, normals)[:, 0]
+    return _Model(
+        at, normals, weight, data, smooth, bend, weight.sum() / shared, shared
+    )
+
+
+def _moved(angles: Array, s: Array, normals: Array) -> Array:
+    """Return the normal displacement that changes of theta (columns) cause."""
+    step = s[1] - s[0]
+    along = np.cumsum(angles[:, :, None] * normals[:, None, :] * step, axis=0)
+    along -= 0.5 * step * angles[:, :, None] * normals[:, None, :]
+    return np.asarray(np.einsum("nkd,nd->nk", along, normals))
+
+
+def _jumps(model: _Model, places: Array) -> Array:
+    """Columns of a jump of curvature and of its slope at each place, (n, 2 m)."""
+    beyond = np.clip(model.s[:, None] - places, 0.0, None) / model.s[-1]
+    angles = np.stack([beyond, beyond**2], axis=2).reshape(len(model.s), -1)
+    return _moved(angles, model.s, model.normals)
+
+
+def _gains(model: _Model, joints: list[float], places: Array | None) -> Array:
+    """Return twice the log evidence with one more joint at each place, shape (m,).
+
+    Without places: of the given joints alone, shape (1,).
+    """
+    columns = model.smooth
+    if joints:
+        columns = np.column_stack([columns, _jumps(model, np.array(joints))])
+    weighted = columns * (model.weight / model.shared)[:, None]
+    normal, right = weighted.T @ columns, weighted.T @ model.offset
+    total = float(np.sum(model.weight * model.offset**2)) / model.shared
+    size, smooth = len(right), model.smooth.shape[1]
+    bend = np.zeros((size, size))
+    bend[:smooth, :smooth] = model.bend
+    prior = _prior(model)
+    tight = np.zeros(size)
+    tight[smooth:] = prior
+    extra = None
+    if places is not None:
+        jumps = _jumps(model, places)
+        m = len(places)
+        cross = weighted.T @ jumps
+        pairs = jumps.reshape(len(model.s), m, 2)
+        scaled = pairs * (model.weight / model.shared)[:, None, None]
+        own = np.einsum("nma,nmb->mab", scaled, pairs) + prior * np.eye(2)
+        pull = np.einsum("nma,n->ma", scaled, model.offset)
+        extra = (cross, own, pull)
+    best = np.full(1 if places is None else len(places), -np.inf)
+    joined = len(joints) + (places is not None)
+    for strength in np.trace(normal) * 10.0 ** np.arange(-10.0, 2.0, 0.5):
+        matrix = normal + strength * bend + np.diag(tight)
+        matrix += 1e-13 * np.trace(normal) * np.eye(size)
+        lower = np.linalg.cholesky(matrix)
+        known = np.linalg.solve(lower, right)
+        left = np.full(len(best), total - float(known @ known))
+        volume = np.full(len(best), 2.0 * float(np.sum(np.log(np.diag(lower)))))
+        if extra is not None:
+            cross, own, pull = extra
+            seen = np.linalg.solve(lower, cross)
+            pairs = seen.reshape(size, -1, 2)
+            block = own - np.einsum("pma,pmb->mab", pairs, pairs)
+            force = pull - np.einsum("pma,p->ma", pairs, known)
+            det = block[:, 0, 0] * block[:, 1, 1] - block[:, 0, 1] ** 2
+            gain = (
+                block[:, 1, 1] * force[:, 0] ** 2
+                - 2.0 * block[:, 0, 1] * force[:, 0] * force[:, 1]
+                + block[:, 0, 0] * force[:, 1] ** 2
+            ) / det
+            left = left - gain
+            volume = volume + np.log(det)
+        left = np.maximum(left, 1e-12 * total + 1e-30)
+        score = -(model.count - 4.0) * np.log(left) - volume
+        score += _PIECES * np.log(strength) + 2.0 * joined * np.log(prior)
+        best = np.maximum(best, score)
+    return best
+
+
+def _prior(model: _Model) -> float:
+    """Prior precision of a jump times the variance of a station.
+
+    A jump of curvature of the order of one radian over the whole length; stations are
+    good to about a twentieth of a pixel.
+    """
+    return 0.05**2 / 1.0**2
