@@ -29,6 +29,9 @@ SHARED = 8.0
 """Stations 1 px apart that carry one station's worth of information: bilinear samples,
 compressed pictures and shade on the paper make neighbours alike."""
 
+_FAIR = 0.1
+"""Weight of the penalty before the last step, in units of the data's."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Curve:
@@ -52,40 +55,51 @@ class Curve:
     @property
     def tangents(self) -> Array:
         """Unit tangents, shape (n, 2)."""
-        return np.column_stack([np.cos(self.theta), np.sin(self.theta)])
+        tangents = np.empty((len(self.theta), 2))
+        np.cos(self.theta, out=tangents[:, 0])
+        np.sin(self.theta, out=tangents[:, 1])
+        return tangents
 
     @property
     def normals(self) -> Array:
         """Unit normals to the right in the picture (y down), shape (n, 2)."""
-        return np.column_stack([-np.sin(self.theta), np.cos(self.theta)])
+        normals = np.empty((len(self.theta), 2))
+        np.negative(np.sin(self.theta), out=normals[:, 0])
+        np.cos(self.theta, out=normals[:, 1])
+        return normals
 
     def at(self, s: Array) -> tuple[Array, Array]:
         """Return points (n, 2) and angles (n,) at any s; beyond the ends an arc."""
-        s = np.asarray(s, dtype=np.float64)
-        inside = np.clip(s, self.s[0], self.s[-1])
-        step = self.s[1] - self.s[0]
-        place = (inside - self.s[0]) / step
-        k = np.clip(place.astype(np.int64), 0, len(self.s) - 2)
-        u = (place - k) * step
-        base, kappa = self.theta[k], self.kappa[k]
-        slope = (self.kappa[k + 1] - kappa) / step
-        theta = base + u * (kappa + 0.5 * slope * u)
-        middle = base + 0.5 * u * (kappa + 0.25 * slope * u)
-        points = self.points[k] + u[:, None] * np.column_stack(
-            [np.cos(middle), np.sin(middle)]
-        )
-        beyond = s - inside
-        if np.any(beyond != 0.0):
-            bend = np.where(beyond > 0.0, self._end_kappa(-1), self._end_kappa(0))
-            turned = theta + 0.5 * beyond * bend
-            points = points + beyond[:, None] * np.column_stack(
-                [np.cos(turned), np.sin(turned)]
-            )
-            theta = theta + beyond * bend
+        s = np.ascontiguousarray(s, dtype=np.float64)
+        points, theta = np.empty((len(s), 2)), np.empty(len(s))
+        _evaluate(s, self.s, self.points, self.theta, self.kappa, points, theta)
         return points, theta
 
-    def _end_kappa(self, end: int) -> float:
-        return float(self.kappa[end])
+
+@njit(cache=True)
+def _evaluate(
+    at: Array, s: Array, points: Array, theta: Array, kappa: Array,
+    out: Array, angle: Array,
+) -> None:  # fmt: skip
+    """Points and angles of a curve: curvature linear between stations."""
+    last = s.size - 1
+    step = s[1] - s[0]
+    for i in range(at.size):
+        inside = min(max(at[i], s[0]), s[last])
+        place = (inside - s[0]) / step
+        k = min(max(int(place), 0), last - 1)
+        u = (place - k) * step
+        slope = (kappa[k + 1] - kappa[k]) / step
+        middle = theta[k] + 0.5 * u * (kappa[k] + 0.25 * slope * u)
+        turned = theta[k] + u * (kappa[k] + 0.5 * slope * u)
+        x, y = points[k, 0] + u * np.cos(middle), points[k, 1] + u * np.sin(middle)
+        beyond = at[i] - inside
+        if beyond != 0.0:
+            bend = kappa[last] if beyond > 0.0 else kappa[0]
+            middle = turned + 0.5 * beyond * bend
+            x, y = x + beyond * np.cos(middle), y + beyond * np.sin(middle)
+            turned += beyond * bend
+        out[i, 0], out[i, 1], angle[i] = x, y, turned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -104,8 +118,12 @@ class CurveFit:
         Factor by which correlated residuals widen variances.
     freedom : float
         Effective number of parameters.
-    normal_root, theta_root, kappa_root : ndarray, shape (n, p)
-        Matrices R with covariance R R^T, of the normal position, theta and kappa.
+    jacobian : ndarray, shape (n, p)
+        Change of the normal position by the parameters: origin, then coefficients.
+    basis, slopes : ndarray, shape (n, p - 1)
+        theta and kappa by the coefficients.
+    root : ndarray, shape (p, p)
+        Matrix R with R R^T the covariance of the parameters.
     """
 
     curve: Curve
@@ -113,24 +131,30 @@ class CurveFit:
     noise: float
     correlation: float
     freedom: float
-    normal_root: Array
-    theta_root: Array
-    kappa_root: Array
+    jacobian: Array
+    basis: Array
+    slopes: Array
+    root: Array
 
     @property
     def sigma(self) -> Array:
         """Standard deviation of the normal position, shape (n,)."""
-        return np.asarray(np.sqrt(np.sum(self.normal_root**2, axis=1)))
+        return _deviation(self.jacobian, self.root)
 
     @property
     def sigma_theta(self) -> Array:
         """Standard deviation of theta, shape (n,)."""
-        return np.asarray(np.sqrt(np.sum(self.theta_root**2, axis=1)))
+        return _deviation(self.basis, self.root[1:])
 
     @property
     def sigma_kappa(self) -> Array:
         """Standard deviation of kappa, shape (n,)."""
-        return np.asarray(np.sqrt(np.sum(self.kappa_root**2, axis=1)))
+        return _deviation(self.slopes, self.root[1:])
+
+
+def _deviation(rows: Array, root: Array) -> Array:
+    spread = rows @ root
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", spread, spread)))
 
 
 def fit_curve(
@@ -180,27 +204,24 @@ def fit_curve(
     penalty = bends.T @ bends
     if theta is None:
         theta = _chord_angles(points)
-    start = basis.T @ basis + 1e-3 * penalty * spacing**5
-    start += 1e-9 * np.eye(basis.shape[1])
-    coefficients: Array = np.asarray(
-        np.linalg.solve(start, basis.T @ theta), dtype=np.float64
-    )
     weight = weights / max(float(weights.max()), 1e-12)
+    coefficients = _start(basis, theta, penalty * spacing**5)
     origin = _origin(s, points, weight, basis_mid @ coefficients)
-    for _ in range(iterations):
-        curve = _integrate(s, origin, coefficients, basis, basis_mid, slopes)
-        jacobian = _jacobian(curve, basis_mid, coefficients)
-        residual = np.sum((points - curve.points) * curve.normals, axis=1)
-        residual[weight == 0.0] = 0.0
+    for turn in range(iterations):
+        path = _integrate(s, origin, coefficients, basis, basis_mid, slopes)
+        jacobian = _jacobian(path, basis_mid)
         system = _solve(
-            jacobian, residual, weight, penalty, coefficients, stiffness, shared
-        )
-        origin = origin + system.change[0] * curve.normals[0]
+            jacobian, _residual(points, path, weight), weight, penalty, coefficients,
+            stiffness, shared, last=turn == iterations - 1,
+        )  # fmt: skip
+        turned = np.array([-path.rate[0, 1], path.rate[0, 0]])
+        origin = origin + system.change[0] * turned
         coefficients = coefficients + system.change[1:]
-    curve = _integrate(s, origin, coefficients, basis, basis_mid, slopes)
-    residual = np.sum((points - curve.points) * curve.normals, axis=1)
-    residual[weight == 0.0] = np.nan
-    return _with_covariance(curve, residual, weight, jacobian, system, basis, slopes)
+    path = _integrate(s, origin, coefficients, basis, basis_mid, slopes)
+    residual = _residual(points, path, weight)
+    return _with_covariance(
+        path.curve, residual, weight, jacobian, system, basis, slopes
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,6 +310,31 @@ def _chord_angles(points: Array) -> Array:
     return np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
 
 
+def _start(basis: Array, theta: Array, stiff: Array) -> Array:
+    """Return coefficients of a smooth curve through given angles."""
+    normal = np.zeros((basis.shape[1], basis.shape[1]))
+    right = np.zeros(basis.shape[1])
+    _accumulate(basis, theta, normal, right)
+    normal += 1e-3 * stiff
+    normal.flat[:: len(right) + 1] += 1e-9
+    return np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
+
+
+@njit(cache=True)
+def _accumulate(basis: Array, theta: Array, normal: Array, right: Array) -> None:
+    """Add basis^T basis and basis^T theta; at most four splines overlap."""
+    stations, count = basis.shape
+    first = 0
+    for i in range(stations):
+        while first < count - 1 and basis[i, first] == 0.0:
+            first += 1
+        end = min(first + 4, count)
+        for j in range(first, end):
+            right[j] += basis[i, j] * theta[i]
+            for k in range(first, end):
+                normal[j, k] += basis[i, j] * basis[i, k]
+
+
 def _origin(s: Array, points: Array, weight: Array, theta_mid: Array) -> Array:
     h = s[1] - s[0]
     path = np.zeros_like(points)
@@ -299,74 +345,110 @@ def _origin(s: Array, points: Array, weight: Array, theta_mid: Array) -> Array:
     return np.asarray(np.mean((points - path)[used], axis=0))
 
 
+@dataclass(frozen=True, slots=True)
+class _Path:
+    """A curve with what its derivatives need."""
+
+    curve: Curve
+    rate: Array
+    rate_mid: Array
+
+
 def _integrate(
     s: Array, origin: Array, coefficients: Array, basis: Array, basis_mid: Array,
     slopes: Array,
-) -> Curve:  # fmt: skip
+) -> _Path:  # fmt: skip
     theta = basis @ coefficients
-    mid = basis_mid @ coefficients
-    h = s[1] - s[0]
-    # Simpson's rule on each interval: ends and middle.
-    rate = np.column_stack([np.cos(theta), np.sin(theta)])
-    rate_mid = np.column_stack([np.cos(mid), np.sin(mid)])
-    points = np.empty((len(s), 2))
+    rate, points = np.empty((len(s), 2)), np.empty((len(s), 2))
+    rate_mid = np.empty((len(s) - 1, 2))
     points[0] = origin
-    points[1:] = origin + np.cumsum(
-        h / 6.0 * (rate[:-1] + 4.0 * rate_mid + rate[1:]), axis=0
-    )
-    return Curve(s=s, points=points, theta=theta, kappa=slopes @ coefficients)
+    _walk(s[1] - s[0], theta, basis_mid @ coefficients, rate, rate_mid, points)
+    curve = Curve(s=s, points=points, theta=theta, kappa=slopes @ coefficients)
+    return _Path(curve, rate, rate_mid)
 
 
-def _jacobian(curve: Curve, basis_mid: Array, coefficients: Array) -> Array:
+@njit(cache=True)
+def _walk(
+    step: float, theta: Array, mid: Array, rate: Array, rate_mid: Array, points: Array
+) -> None:
+    """Fill unit tangents, and points by Simpson's rule on each interval."""
+    h = step / 6.0
+    rate[0, 0], rate[0, 1] = np.cos(theta[0]), np.sin(theta[0])
+    for i in range(mid.size):
+        rate_mid[i, 0], rate_mid[i, 1] = np.cos(mid[i]), np.sin(mid[i])
+        rate[i + 1, 0], rate[i + 1, 1] = np.cos(theta[i + 1]), np.sin(theta[i + 1])
+        for k in range(2):
+            mean = rate[i, k] + 4.0 * rate_mid[i, k] + rate[i + 1, k]
+            points[i + 1, k] = points[i, k] + h * mean
+
+
+def _residual(points: Array, path: _Path, weight: Array) -> Array:
+    """Distance of the measured points along the normal; 0 where there is none."""
+    away = points - path.curve.points
+    across = path.rate[:, 0] * away[:, 1] - path.rate[:, 1] * away[:, 0]
+    return np.where(weight == 0.0, 0.0, across)
+
+
+def _jacobian(path: _Path, basis_mid: Array) -> Array:
     """Change of the normal position by origin (along its normal) and coefficients."""
-    step = curve.s[1] - curve.s[0]
-    jacobian = np.empty((len(curve.s), basis_mid.shape[1] + 1))
-    _fill_jacobian(basis_mid @ coefficients, curve.normals, basis_mid, step, jacobian)
+    step = path.curve.s[1] - path.curve.s[0]
+    jacobian = np.empty((len(path.rate), basis_mid.shape[1] + 1))
+    _fill_jacobian(path.rate, path.rate_mid, basis_mid, step, jacobian)
     return jacobian
 
 
 @njit(cache=True)
 def _fill_jacobian(
-    mid: Array, normals: Array, basis_mid: Array, step: float, jacobian: Array
+    rate: Array, rate_mid: Array, basis_mid: Array, step: float, jacobian: Array
 ) -> None:
     stations, count = basis_mid.shape
-    along = np.zeros((count, 2))
+    along_x, along_y = np.zeros(count), np.zeros(count)
+    first, end = 0, 0
     for i in range(stations + 1):
-        jacobian[i, 0] = normals[i, 0] * normals[0, 0] + normals[i, 1] * normals[0, 1]
-        for k in range(count):
-            jacobian[i, k + 1] = (
-                normals[i, 0] * along[k, 0] + normals[i, 1] * along[k, 1]
-            )
+        x, y = rate[i, 0], rate[i, 1]
+        jacobian[i, 0] = x * rate[0, 0] + y * rate[0, 1]
+        for k in range(end):
+            jacobian[i, k + 1] = x * along_y[k] - y * along_x[k]
+        for k in range(end, count):
+            jacobian[i, k + 1] = 0.0
         if i < stations:
-            x, y = -step * np.sin(mid[i]), step * np.cos(mid[i])
-            for k in range(count):
-                value = basis_mid[i, k]
-                if value != 0.0:
-                    along[k, 0] += x * value
-                    along[k, 1] += y * value
+            while first < count - 1 and basis_mid[i, first] == 0.0:
+                first += 1
+            end = min(first + 4, count)
+            for k in range(first, end):
+                along_x[k] -= step * rate_mid[i, 1] * basis_mid[i, k]
+                along_y[k] += step * rate_mid[i, 0] * basis_mid[i, k]
 
 
 def _solve(
     jacobian: Array, residual: Array, weight: Array, penalty: Array,
-    coefficients: Array, strength: float | None, shared: float,
+    coefficients: Array, strength: float | None, shared: float, *, last: bool,
 ) -> _System:  # fmt: skip
     """Solve for the change, with the most likely weight of the penalty (REML).
 
     Neighbouring residuals share pixels, so `shared` of them count as one. One
     eigenproblem serves every weight: with normal = L L^T and L^-1 P L^-T = U d U^T,
-    normal + w P = (L U) (1 + w d) (L U)^T.
+    normal + w P = (L U) (1 + w d) (L U)^T. Before the last step any fair weight does:
+    it moves only the point at which the next step is taken.
     """
-    weighted = jacobian * weight[:, None]
-    normal = weighted.T @ jacobian / shared
-    right = weighted.T @ residual / shared
+    weighted = jacobian * np.sqrt(weight / shared)[:, None]
+    normal = weighted.T @ weighted
+    right = jacobian.T @ (weight * residual / shared)
     size = len(right)
     full = np.zeros((size, size))
     full[1:, 1:] = penalty
     pull = np.zeros(size)
     pull[1:] = penalty @ coefficients
     scale = float(np.trace(normal) / np.trace(full))
-    lower = np.linalg.cholesky(normal + 1e-9 * scale * full + _ridge(normal))
-    inverse = np.linalg.inv(lower)
+    # Parts of the rod without data must not make the matrix singular.
+    ridge = 1e-11 * float(np.trace(normal)) / size
+    normal.flat[:: size + 1] += ridge
+    normal += 1e-9 * scale * full
+    if not last:
+        fair = _FAIR * scale if strength is None else strength
+        change = np.linalg.solve(normal + fair * full, right - fair * pull)
+        return _System(change, full, 0.0, shared)
+    inverse = np.linalg.inv(np.linalg.cholesky(normal))
     d, u = np.linalg.eigh(inverse @ full @ inverse.T)
     d = np.maximum(d, 0.0)
     z = inverse.T @ u
@@ -384,24 +466,25 @@ def _solve(
     return _System(change, root, float(np.sum(1.0 / growth)), shared)
 
 
-def _ridge(normal: Array) -> Array:
-    """Keep parts of the rod without data from making the matrix singular."""
-    size = len(normal)
-    return np.asarray(1e-11 * np.trace(normal) / size * np.eye(size))
-
-
+@njit(cache=True)
 def _most_likely(
     scale: float, d: Array, force: Array, bend: Array, total: float, stored: float,
     count: float,
 ) -> float:  # fmt: skip
     """Return the penalty weight of greatest restricted likelihood."""
-    weights = scale * 10.0 ** np.arange(-9.0, 5.0, 0.25)
-    growth = 1.0 + weights[:, None] * d
-    gain = np.sum((force - weights[:, None] * bend) ** 2 / growth, axis=1)
-    left = np.maximum(total + weights * stored - gain, 1e-12 * total + 1e-30)
-    score = count * np.log(left) + np.sum(np.log(growth), axis=1)
-    score -= (len(d) - 4.0) * np.log(weights)
-    return float(weights[int(np.argmin(score))])
+    best, least = scale, np.inf
+    for power in range(-36, 20):
+        weight = scale * 10.0 ** (0.25 * power)
+        gain, logs = 0.0, 0.0
+        for k in range(d.size):
+            growth = 1.0 + weight * d[k]
+            gain += (force[k] - weight * bend[k]) ** 2 / growth
+            logs += np.log(growth)
+        left = max(total + weight * stored - gain, 1e-12 * total + 1e-30)
+        score = count * np.log(left) + logs - (d.size - 4.0) * np.log(weight)
+        if score < least:
+            best, least = weight, score
+    return best
 
 
 def _with_covariance(
@@ -409,36 +492,44 @@ def _with_covariance(
     basis: Array, slopes: Array,
 ) -> CurveFit:  # fmt: skip
     used = weight > 0.0
-    count = int(used.sum())
-    squares = float(np.sum(weight[used] * residual[used] ** 2))
+    count = int(np.count_nonzero(used))
+    squares = float(weight @ residual**2)
     noise = np.sqrt(squares / max(count - system.freedom, 1.0))
-    correlation = _correlation(residual, weight)
-    root = system.inverse_root * noise * np.sqrt(correlation / system.shared)
+    correlation = _correlation(residual, used, 24)
     return CurveFit(
         curve=curve,
-        residual=residual,
+        residual=np.where(used, residual, np.nan),
         noise=float(noise),
         correlation=correlation,
         freedom=system.freedom,
-        normal_root=jacobian @ root,
-        theta_root=basis @ root[1:],
-        kappa_root=slopes @ root[1:],
+        jacobian=jacobian,
+        basis=basis,
+        slopes=slopes,
+        root=system.inverse_root * noise * np.sqrt(correlation / system.shared),
     )
 
 
-def _correlation(residual: Array, weight: Array, lags: int = 24) -> float:
+@njit(cache=True)
+def _correlation(residual: Array, used: NDArray[np.bool_], lags: int) -> float:
     """Return 1 + 2 sum of the residuals' autocorrelation, at least 1."""
-    value = np.where(weight > 0.0, np.nan_to_num(residual), 0.0)
-    used = (weight > 0.0).astype(np.float64)
-    power = float(value @ value) / max(float(used.sum()), 1.0)
+    power, count = 0.0, 0
+    for i in range(residual.size):
+        if used[i]:
+            power += residual[i] ** 2
+            count += 1
     if power <= 0.0:
         return 1.0
+    power /= count
     total = 1.0
-    for lag in range(1, min(lags, len(value) - 2) + 1):
-        pairs = float(used[lag:] @ used[:-lag])
-        if pairs < 4.0:
+    for lag in range(1, min(lags, residual.size - 2) + 1):
+        product, pairs = 0.0, 0
+        for i in range(lag, residual.size):
+            if used[i] and used[i - lag]:
+                product += residual[i] * residual[i - lag]
+                pairs += 1
+        if pairs < 4:
             break
-        rho = float(value[lag:] @ value[:-lag]) / pairs / power
+        rho = product / pairs / power
         if rho < 0.02:
             break
         total += 2.0 * rho
