@@ -7,6 +7,8 @@ import os
 import secrets
 from pathlib import Path
 
+from .errors import InputError
+
 
 def write_bytes(path: Path, data: bytes) -> None:
     """Write `data` so that `path` holds the old content or all of the new.
@@ -16,9 +18,16 @@ def write_bytes(path: Path, data: bytes) -> None:
 
     Raises
     ------
+    InputError
+        If `path` is empty or names no file.
     OSError
-        If the folder is missing, read-only or full; no temporary file is left.
+        If the folder is missing, read-only or full; it names `path`, and no temporary
+        file is left.
     """
+    if not path.name or path.is_dir():
+        raise InputError(
+            f"the output file must have a name; instead received the folder {path}"
+        )
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     try:
         with temporary.open("wb") as file:
@@ -26,9 +35,13 @@ def write_bytes(path: Path, data: bytes) -> None:
             file.flush()
             os.fsync(file.fileno())
         temporary.replace(path)
-    except BaseException:
+    except BaseException as error:
         with contextlib.suppress(OSError):
             temporary.unlink()
+        if isinstance(error, OSError):
+            error.filename, error.filename2 = str(path), None
+            if isinstance(error, FileNotFoundError):
+                error.strerror = f"there is no folder {path.parent}; make it first"
         raise
     sync_folder(path.parent)
 

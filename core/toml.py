@@ -7,9 +7,16 @@ import json
 import re
 import tomllib
 from pathlib import Path
-from typing import Any, TypeVar
+from types import UnionType
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+)
 
 from .errors import ConfigError
 
@@ -18,11 +25,24 @@ Model = TypeVar("Model", bound="FileModel")
 
 
 class FileModel(BaseModel):
-    """Base of all file models: unknown keys, NaN and infinity are refused."""
+    """Base of all file models: unknown keys, NaN and infinity are refused.
+
+    So are texts and truth values where a number belongs: 1.0, not "1.0" or true.
+    """
 
     model_config = ConfigDict(
         extra="forbid", frozen=True, allow_inf_nan=False, str_strip_whitespace=True
     )
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _only_numbers_are_numbers(cls, value: Any, info: ValidationInfo) -> Any:
+        field = cls.model_fields[info.field_name or ""]
+        kinds = _plain_types(field.annotation)
+        number = bool(kinds & {int, float}) and type(value) not in kinds
+        if number and isinstance(value, (str, bool)):
+            raise ValueError("must be a number, without quotes")
+        return value
 
 
 def read_toml(path: Path, model: type[Model]) -> Model:
@@ -56,7 +76,7 @@ def read_text(path: Path) -> str:
         If it is missing, a folder, unreadable, or not UTF-8.
     """
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise ConfigError(f"{path}: there is no such file") from None
     except IsADirectoryError:
@@ -107,6 +127,18 @@ def line_of(text: str, location: Location) -> int | None:
     return table_line
 
 
+def _plain_types(annotation: Any) -> set[Any]:
+    """Types that a value may have itself: int and float in ``float | int | None``."""
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        return _plain_types(get_args(annotation)[0])
+    if origin in (Union, UnionType):
+        return set().union(*(_plain_types(part) for part in get_args(annotation)))
+    if origin is Literal:
+        return {type(choice) for choice in get_args(annotation)}
+    return {annotation} if origin is None else set()
+
+
 def _sentence(
     path: Path, text: str, error: ValidationError, model: type[BaseModel]
 ) -> str:
@@ -121,6 +153,10 @@ def _sentence(
         return f"{where}: unknown key {key!r}{_suggestion(location, model)}"
     if first["type"] == "missing":
         return f"{where}: the key {key!r} is missing"
+    if first["type"] == "too_short":
+        return (
+            f"{where}: {key}: must hold at least {first['ctx']['min_length']} of them"
+        )
     message = first["msg"].removeprefix("Value error, ")
     message = message[0].lower() + message[1:]
     return f"{where}: {key}: {message}; instead received {first['input']!r}"

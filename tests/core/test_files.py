@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from magbend.core.errors import ConfigError
+from magbend.core.errors import ConfigError, InputError
 from magbend.core.files import write_bytes
 from magbend.core.specimen_file import (
     read_magnet,
@@ -62,6 +62,8 @@ def test_a_specimen_survives_the_round_trip(tmp_path: Path) -> None:
         ("E_MPa = 15.0", "E_MPa = -15.0", ["line 11", "E_MPa", "-15.0"]),
         ("E_MPa = 15.0", "E_MPa = nan", ["line 11", "E_MPa", "finite"]),
         ("E_MPa = 15.0", 'E_MPa = "soft"', ["line 11", "E_MPa", "'soft'"]),
+        ("E_MPa = 15.0", 'E_MPa = "15.0"', ["line 11", "E_MPa", "without quotes"]),
+        ("side_mm = 1.0", "side_mm = true", ["line 2", "side_mm", "must be a number"]),
         ("E_MPa = 15.0", "E_MPa = ", ["not valid TOML", "line 11"]),
         ("E_MPa = 15.0", "Emod_MPa = 15.0", ["line 11", "unknown key", "E_MPa"]),
     ],
@@ -118,3 +120,22 @@ def test_a_failed_write_leaves_the_old_file_and_nothing_else(
         write_bytes(path, b"new")
     assert path.read_bytes() == b"old"
     assert [p.name for p in tmp_path.iterdir()] == ["record.json"]
+
+
+def test_a_byte_order_mark_does_not_matter(tmp_path: Path) -> None:
+    path = tmp_path / "rod.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + GOOD.encode())
+    assert read_specimen(path).length_mm == 20.0
+
+
+def test_a_place_that_cannot_be_written_is_named_as_the_user_named_it(
+    tmp_path: Path,
+) -> None:
+    with pytest.raises(FileNotFoundError, match="make it first") as caught:
+        write_bytes(tmp_path / "absent" / "shape.csv", b"new")
+    assert caught.value.filename == str(tmp_path / "absent" / "shape.csv")
+    with pytest.raises(InputError, match="must have a name"):
+        write_bytes(tmp_path, b"new")
+    with pytest.raises(InputError, match="must have a name"):
+        write_bytes(Path(), b"new")
+    assert list(tmp_path.iterdir()) == []
