@@ -91,10 +91,13 @@ def _print(fit: MagnetFit, printed: list[dict[str, float]]) -> None:
             f"{reading.predicted_mT:12.2f}  {reading.residual_percent:+10.1f}  "
             f"{reading.verdict}"
         )
-    typer.echo(
-        f"one remanence for all: {fit.remanence_T:.4f} +- {fit.remanence_sd_T:.4f} T"
-        f" (reduced chi2 {fit.chi2_reduced:.3g})"
-    )
+    spread = ""
+    if fit.remanence_sd_T == fit.remanence_sd_T:
+        spread = f" +- {fit.remanence_sd_T:.4f}"
+    chi2 = " (no reading left over to say how well they agree)"
+    if fit.chi2_reduced == fit.chi2_reduced:
+        chi2 = f" (reduced chi2 {fit.chi2_reduced:.3g})"
+    typer.echo(f"one remanence for all: {fit.remanence_T:.4f}{spread} T{chi2}")
     if fit.offset_sd_mm:
         typer.echo(f"probe offset: {fit.offset_mm:.2f} +- {fit.offset_sd_mm:.2f} mm")
     if abs(fit.remanence_T) > STRONGEST_T:

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.checks import positive
+from ..core.checks import positive, within
 from ..core.errors import ConfigError, InputError
 from ..core.units import T_from_mT, mT_from_T
 
@@ -245,6 +245,10 @@ def _checked(
             "flux_mT must be finite, not zero and of one sign in mT; instead received "
             f"{flux.tolist()}"
         )
+    for gap in gaps:
+        within(float(gap), 0.0, 1e5, "gap_mm", "mm")
+    for value in flux:
+        within(float(value), -3e4, 3e4, "flux_mT", "mT")
     if sd is not None and (not np.all(np.isfinite(sd)) or np.any(sd <= 0.0)):
         raise InputError(
             f"sd_mT must be above zero in mT; instead received {sd.tolist()}"
@@ -328,6 +332,12 @@ def read_readings(path: Path) -> tuple[list[float], list[float], list[float] | N
     rows = list(csv.DictReader(read_text(path).splitlines(), skipinitialspace=True))
     if not rows:
         raise ConfigError(f"{path}: must hold at least one reading; it holds none")
+    for line, row in enumerate(rows, start=2):
+        if None in row:
+            raise ConfigError(
+                f"{path}, line {line}: has more values than the header has columns; "
+                "write decimals with a point, not a comma"
+            )
     columns: dict[str, list[float]] = {}
     names = [str(name).strip() for name in rows[0]]
     for name in ("gap_mm", "flux_mT"):

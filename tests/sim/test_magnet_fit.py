@@ -133,3 +133,14 @@ def test_bad_tables_name_the_line(tmp_path: Path, text: str, pattern: str) -> No
     path.write_text(text)
     with pytest.raises(ConfigError, match=pattern):
         read_readings(path)
+
+
+def test_absurd_readings_are_refused_with_their_unit(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"gap_mm must be from 0 to 100000 mm"):
+        fit_magnet([1e300, 60.0], [38.0, 50.0])
+    with pytest.raises(InputError, match=r"flux_mT must be from -30000 to 30000 mT"):
+        fit_magnet([70.0, 60.0], [38.0, 1e300])
+    path = tmp_path / "readings.csv"
+    path.write_text("gap_mm,flux_mT\n70,5,38\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"line 2: has more values"):
+        read_readings(path)
