@@ -55,12 +55,12 @@ def read_toml(path: Path, model: type[Model]) -> Model:
         value that cannot be: one sentence with file, line, key and what is expected.
     """
     text = read_text(path)
+    is_json = text.lstrip().startswith("{")
     try:
-        data = (
-            json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
-        )
-    except (tomllib.TOMLDecodeError, json.JSONDecodeError) as error:
-        raise ConfigError(f"{path}: is not valid TOML: {error}") from None
+        data = json.loads(text) if is_json else tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        kind = "JSON" if is_json else "TOML"
+        raise ConfigError(f"{path}: is not valid {kind}: {error}") from None
     try:
         return model.model_validate(data)
     except ValidationError as error:
