@@ -10,9 +10,11 @@ edges are measured later in the full picture.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 WORK_PX = 1000
@@ -79,7 +81,8 @@ def binarise(grey: NDArray[np.float32], *, invert: bool | None = None) -> Binary
         invert = bool(high - middle > middle - low)
     if invert:
         work = np.float32(max(high, float(sample.max()))) - work
-    ratio = np.asarray(cv2.divide(work, background(work)), dtype=np.float32)
+    ratio = np.empty_like(work)
+    _divide(work, *_background(work), ratio)
     return _threshold(ratio, factor, invert)
 
 
@@ -116,33 +119,25 @@ def _mask(ratio: NDArray[np.float32], threshold: float) -> NDArray[np.uint8]:
     return np.asarray((ratio < threshold).view(np.uint8))
 
 
-def background(work: NDArray[np.float32]) -> NDArray[np.float32]:
+def _background(
+    work: NDArray[np.float32],
+) -> tuple[NDArray[np.float32], np.float32]:
     """Fit the light on the bare background: a quadric, dark things rejected.
 
-    Parameters
-    ----------
-    work : ndarray, shape (h, w), float32
-        Linear light.
-
-    Returns
-    -------
-    ndarray, shape (h, w), float32
-        Above zero everywhere.
+    Returns its coefficients, for rows and columns from -1 to 1, and the least value.
     """
     height, width = work.shape
     step = max(1, int((height * width / _SAMPLE) ** 0.5))
     sample = work[::step, ::step]
-    rows = np.linspace(-1.0, 1.0, sample.shape[0])
-    columns = np.linspace(-1.0, 1.0, sample.shape[1])
-    basis = _quadric(rows, columns)
+    basis = _quadric(*sample.shape)
     value = sample.astype(np.float64).ravel()
     inside = value > np.quantile(value, 0.4)
     fit = np.zeros_like(value)
     for band in (0.25, 0.15, 0.1, 0.1):
-        design = basis[inside]
+        design = basis * inside[:, None]
         normal = design.T @ design + 1e-9 * np.eye(6)
         coefficients = np.asarray(
-            np.linalg.solve(normal, design.T @ value[inside]), dtype=np.float64
+            np.linalg.solve(normal, design.T @ value), dtype=np.float64
         )
         fit = basis @ coefficients
         level = np.maximum(fit, 1e-3)
@@ -150,26 +145,33 @@ def background(work: NDArray[np.float32]) -> NDArray[np.float32]:
         if inside.sum() < 60:
             coefficients = np.array([np.quantile(value, 0.7), 0, 0, 0, 0, 0])
             break
-    smooth = _evaluate(coefficients, height // 8 + 2, width // 8 + 2)
-    smooth = np.asarray(cv2.resize(smooth, (width, height)))
-    floor = np.float32(max(0.2 * float(np.quantile(value, 0.6)), 1e-4))
-    return np.maximum(smooth, floor)
+    floor = max(0.2 * float(np.quantile(value, 0.6)), 1e-4)
+    return coefficients.astype(np.float32), np.float32(floor)
 
 
-def _quadric(
-    rows: NDArray[np.float64], columns: NDArray[np.float64]
-) -> NDArray[np.float64]:
+@lru_cache(maxsize=8)
+def _quadric(height: int, width: int) -> NDArray[np.float64]:
+    """Return the terms of a quadric at the points of a grid from -1 to 1."""
+    rows, columns = np.linspace(-1.0, 1.0, height), np.linspace(-1.0, 1.0, width)
     y, x = np.meshgrid(rows, columns, indexing="ij")
     terms = (np.ones_like(x), x, y, x * x, x * y, y * y)
     return np.stack([term.ravel() for term in terms], axis=1)
 
 
-def _evaluate(
-    coefficients: NDArray[np.float64], height: int, width: int
-) -> NDArray[np.float32]:
-    c = coefficients.astype(np.float32)
-    y = np.linspace(-1.0, 1.0, height, dtype=np.float32)[:, None]
-    x = np.linspace(-1.0, 1.0, width, dtype=np.float32)[None, :]
-    return np.asarray(
-        (c[0] + c[2] * y + c[5] * y * y) + (c[1] + c[4] * y + c[3] * x) * x
-    )
+@njit(cache=True)
+def _divide(
+    work: NDArray[np.float32], c: NDArray[np.float32], floor: np.float32,
+    ratio: NDArray[np.float32],
+) -> None:  # fmt: skip
+    """Divide by the quadric, which is at least `floor`."""
+    height, width = work.shape
+    step = np.float32(2.0 / max(width - 1, 1))
+    one = np.float32(1.0)
+    for i in range(height):
+        y = np.float32(-1.0 + 2.0 * i / max(height - 1, 1))
+        constant = c[0] + y * (c[2] + c[5] * y)
+        slope = c[1] + c[4] * y
+        for j in range(width):
+            x = np.float32(j) * step - one
+            light = constant + x * (slope + c[3] * x)
+            ratio[i, j] = work[i, j] / max(light, floor)

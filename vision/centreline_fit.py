@@ -448,18 +448,20 @@ def _solve(
         fair = _FAIR * scale if strength is None else strength
         change = np.linalg.solve(normal + fair * full, right - fair * pull)
         return _System(change, full, 0.0, shared)
+    if strength is not None:
+        stiff = normal + strength * full
+        root = np.linalg.inv(np.linalg.cholesky(stiff)).T
+        change = root @ (root.T @ (right - strength * pull))
+        return _System(change, root, float(np.sum(root * (normal @ root))), shared)
     inverse = np.linalg.inv(np.linalg.cholesky(normal))
     d, u = np.linalg.eigh(inverse @ full @ inverse.T)
     d = np.maximum(d, 0.0)
     z = inverse.T @ u
     force, bend = z.T @ right, z.T @ pull
-    if strength is None:
-        total = float(np.sum(weight * residual**2)) / shared
-        stored = float(coefficients @ pull[1:])
-        count = float(np.count_nonzero(weight)) / shared
-        strength = _most_likely(
-            scale, d, force, bend, total, stored, max(count - 4.0, 1.0)
-        )
+    total = float(np.sum(weight * residual**2)) / shared
+    stored = float(coefficients @ pull[1:])
+    count = float(np.count_nonzero(weight)) / shared
+    strength = _most_likely(scale, d, force, bend, total, stored, max(count - 4.0, 1.0))
     growth = 1.0 + strength * d
     root = z / np.sqrt(growth)
     change = z @ ((force - strength * bend) / growth)

@@ -25,6 +25,9 @@ Root = Literal["clamp", "border", "free"]
 LEAST_SLENDERNESS = 6.0
 """Shortest rod, in widths."""
 
+_PAD = 40
+"""How far things are carried past the border of the picture."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
@@ -117,11 +120,7 @@ def _thin_parts(roi: Mask, origin: tuple[int, int], binary: Binary) -> list[Cand
     if half is None:
         return []
     reach = 1.5 * half + 1.0
-    core = depth > reach
-    fat = np.zeros_like(roi)
-    if core.any():
-        away = cv2.distanceTransform((~core).view(np.uint8), cv2.DIST_L2, 5)
-        fat = (away <= reach + 1.0).view(np.uint8)
+    fat = _near((depth > reach).view(np.uint8), reach + 1.0)
     thin = roi & ~fat & 1
     parts, _ = cv2.findContours(thin, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     found = []
@@ -158,23 +157,34 @@ def _edge_distance(
         padded[:, -1] = padded[:, -2]
     if y + h == height:
         padded[-1] = padded[-2]
-    grown = cv2.copyMakeBorder(padded, 40, 40, 40, 40, cv2.BORDER_REPLICATE)
-    if x > 0:
-        grown[:, :40] = 0
-    if y > 0:
-        grown[:40] = 0
-    if x + w < width:
-        grown[:, -40:] = 0
-    if y + h < height:
-        grown[-40:] = 0
+    before_x, before_y = _PAD * (x == 0), _PAD * (y == 0)
+    after_x, after_y = _PAD * (x + w == width), _PAD * (y + h == height)
+    grown = cv2.copyMakeBorder(
+        padded, before_y, after_y, before_x, after_x, cv2.BORDER_REPLICATE
+    )
     depth = np.asarray(cv2.distanceTransform(grown, cv2.DIST_L2, 5))
-    return depth[40:-40, 40:-40] * roi
+    height, width = roi.shape
+    inside = depth[before_y : before_y + height, before_x : before_x + width]
+    return np.asarray(inside * roi, dtype=np.float32)
+
+
+def _near(core: Mask, reach: float) -> Mask:
+    """Mark what is within `reach` of a mask."""
+    near = np.zeros_like(core)
+    x, y, w, h = cv2.boundingRect(core)
+    if w == 0:
+        return near
+    margin = int(reach) + 2
+    x0, y0 = max(x - margin, 0), max(y - margin, 0)
+    window = (slice(y0, y + h + margin), slice(x0, x + w + margin))
+    away = cv2.distanceTransform(1 - core[window], cv2.DIST_L2, 5)
+    near[window] = away <= reach
+    return near
 
 
 def _ridge_half_width(depth: NDArray[np.float32]) -> float | None:
     """Return the half width that a long and thin part of the medial axis shares."""
-    top = cv2.dilate(depth, np.ones((3, 3), np.uint8))
-    ridge = depth[(depth >= top - 0.6) & (depth >= 0.9)]
+    ridge = _ridge(np.ascontiguousarray(depth))
     if ridge.size < 8:
         return None
     bins = np.floor(np.log(ridge) / 0.09).astype(int)
@@ -184,6 +194,27 @@ def _ridge_half_width(depth: NDArray[np.float32]) -> float | None:
     width = np.exp(0.09 * (lowest + np.arange(len(near))))
     best = int(np.argmax(near / np.sqrt(width)))
     return float(np.median(ridge[np.abs(bins - best) <= 2]))
+
+
+@njit(cache=True)
+def _ridge(depth: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the depths that no neighbour exceeds by more than 0.6."""
+    height, width = depth.shape
+    found = np.empty(height * width, dtype=np.float32)
+    count = 0
+    for i in range(height):
+        for j in range(width):
+            here = depth[i, j]
+            if here < np.float32(0.9):
+                continue
+            top = here
+            for k in range(max(i - 1, 0), min(i + 2, height)):
+                for m in range(max(j - 1, 0), min(j + 2, width)):
+                    top = max(top, depth[k, m])
+            if here >= top - np.float32(0.6):
+                found[count] = here
+                count += 1
+    return found[:count]
 
 
 def _trace(
@@ -276,15 +307,26 @@ def _level_sets(piece: Mask, seeds: Mask | None, half: float) -> Array | None:
     top = float(distance.max())
     if top < 4.0 * step:
         return None
-    y, x = np.nonzero(distance >= 0.0)
-    index = (distance[y, x] / step).astype(np.int64)
-    count = np.bincount(index).astype(np.float64)
+    sums = np.zeros((int(top / step) + 1, 3))
+    _sum_sets(distance, step, sums)
+    count = sums[:, 0]
     if np.any(count == 0):
         return None
-    curve = np.column_stack(
-        [np.bincount(index, weights=x) / count, np.bincount(index, weights=y) / count]
-    )
+    curve = sums[:, 1:] / count[:, None]
     return curve[:-1] if count[-1] < 0.5 * np.median(count) else curve
+
+
+@njit(cache=True)
+def _sum_sets(distance: NDArray[np.float32], step: float, sums: Array) -> None:
+    """Add up number, x and y of the pixels of each level set."""
+    height, width = distance.shape
+    for i in range(height):
+        for j in range(width):
+            if distance[i, j] >= 0.0:
+                k = int(distance[i, j] / step)
+                sums[k, 0] += 1.0
+                sums[k, 1] += j
+                sums[k, 2] += i
 
 
 @njit(cache=True)

@@ -10,13 +10,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from .centreline_fit import Curve, fit_curve
-from .edges import rough_edges
+from .edges import STEP_PX, _bilinear, rough_edges
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
+
+_RECENT = 12
+"""Centres from which the next one is predicted."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,34 +111,79 @@ def _follow(
 ) -> Array:
     """Carry centres on at the root end, at most seven widths."""
     step = max(2.0, 0.25 * width)
-    recent = [np.asarray(c) for c in centres[:12]]
-    added: list[Array] = []
-    while len(added) * step < 7.0 * width and len(recent) >= 4:
-        point, direction = _predict(np.array(recent[:12]), step)
-        normal = np.array([-direction[1], direction[0]])
-        low, high, _ = rough_edges(
-            grey, point[None], normal[None],
-            reach=0.5 * width + 4.0, sign=sign, level=level,
-        )  # fmt: skip
-        across = float(high[0] - low[0])
-        aside = 0.5 * float(high[0] + low[0])
-        if not abs(across - width) < 0.2 * width + 0.5 or abs(aside) > 0.2 * width:
+    room = int(7.0 * width / step) + 1
+    path = np.zeros((room + min(len(centres), _RECENT), 2))
+    path[room:] = centres[:_RECENT]
+    head = _carry_on(grey, path, room, width, step, sign, level)
+    return np.concatenate([path[head:room], centres])
+
+
+@njit(cache=True)
+def _carry_on(
+    grey: Image, path: Array, head: int, width: float, step: float, sign: float,
+    level: float,
+) -> int:  # fmt: skip
+    """Fill the path before `head` while there are two edges; return its new head."""
+    while head > 0 and len(path) - head >= 4:
+        x, y, u, v = _predict(path[head : head + _RECENT], step)
+        low, high = _dark_span(grey, x, y, -v, u, 0.5 * width + 6.0, sign, level)
+        aside = 0.5 * (low + high)
+        alike = abs(high - low - width) < 0.2 * width + 0.5
+        if not alike or abs(aside) > 0.2 * width:
             break
-        point = point + aside * normal
-        added.insert(0, point)
-        recent.insert(0, point)
-    return np.concatenate([np.array(added).reshape(-1, 2), centres])
+        head -= 1
+        path[head, 0], path[head, 1] = x - aside * v, y + aside * u
+    return head
 
 
-def _predict(recent: Array, step: float) -> tuple[Array, Array]:
+@njit(cache=True)
+def _dark_span(
+    grey: Image, x: float, y: float, u: float, v: float, reach: float, sign: float,
+    level: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Return where the dark begins and ends on a profile; see `rough_edges`."""
+    count = int(np.ceil(reach / STEP_PX))
+    low, high = np.nan, np.nan
+    for k in range(-count, count + 1):
+        t = k * STEP_PX
+        if sign * _bilinear(grey, x + t * u, y + t * v) < level:
+            if np.isnan(low):
+                low = t - 0.5 * STEP_PX
+            high = t + 0.5 * STEP_PX
+    return low, high
+
+
+@njit(cache=True)
+def _predict(recent: Array, step: float) -> tuple[float, float, float, float]:
     """Return the next point before the first and the unit direction root to tip."""
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(recent, axis=0).T))])
-    degree = 2 if len(recent) >= 6 else 1
-    u = along / along[-1]
-    design = u[:, None] ** np.arange(degree + 1)
-    c = np.linalg.solve(design.T @ design, design.T @ recent)
-    at = -step / along[-1]
-    powers = at ** np.arange(degree + 1)
-    point = powers @ c
-    direction = c[1] if degree == 1 else c[1] + 2.0 * at * c[2]
-    return point, direction / np.hypot(*direction)
+    count = len(recent)
+    along = np.zeros(count)
+    for i in range(1, count):
+        away = recent[i] - recent[i - 1]
+        along[i] = along[i - 1] + np.hypot(away[0], away[1])
+    m = np.zeros((3, 3))
+    right = np.zeros((3, 2))
+    for i in range(count):
+        power = np.array([1.0, along[i], along[i] ** 2])
+        for j in range(3):
+            for k in range(2):
+                right[j, k] += power[j] * recent[i, k]
+            for k in range(3):
+                m[j, k] += power[j] * power[k]
+    if count < 6:  # a straight line
+        m[2, :2], m[:2, 2], right[2] = 0.0, 0.0, 0.0
+    for j in range(3):  # elimination; the matrix is positive definite
+        for i in range(j + 1, 3):
+            share = m[i, j] / m[j, j]
+            m[i] -= share * m[j]
+            right[i] -= share * right[j]
+    c = np.zeros((3, 2))
+    for j in range(2, -1, -1):
+        rest = right[j].copy()
+        for k in range(j + 1, 3):
+            rest -= m[j, k] * c[k]
+        c[j] = rest / m[j, j]
+    point = c[0] - step * c[1] + step * step * c[2]
+    turn = c[1] - 2.0 * step * c[2]
+    size = np.hypot(turn[0], turn[1])
+    return point[0], point[1], turn[0] / size, turn[1] / size
