@@ -52,6 +52,10 @@ class Axis:
         return listed
 
 
+MOST_VALUES = 1_000_000
+STRONGEST_MT = 30_000.0
+
+
 def _parse_axis(value: Any) -> Axis:
     if isinstance(value, Axis):
         return value
@@ -67,6 +71,10 @@ def _parse_axis(value: Any) -> Axis:
         count = value["count"]
         if not isinstance(count, int) or count < 1 or (count == 1 and low < high):
             raise ValueError("count must be a whole number of at least 2")
+        if count > MOST_VALUES:
+            raise ValueError(
+                f"count must be at most {MOST_VALUES}: use method = 'sobol' for more"
+            )
         values = [float(f"{v:.12g}") for v in np.linspace(low, high, count)]
     elif isinstance(value, list):
         if not value:
@@ -158,6 +166,9 @@ class Space(FileModel):
             for name, axis in self._named_axes():
                 if axis.is_range:
                     raise ValueError(f"{name}: a range in a grid must have a count")
+        flux = self.flux_mT
+        if flux is not None and max(-flux.low, flux.high) > STRONGEST_MT:
+            raise ValueError(f"flux_mT must be within {STRONGEST_MT:g} mT")
         _check_lengths(self)
         _check_falling(self)
 

@@ -136,6 +136,8 @@ def toml_of(data: dict) -> str:
         ({"side_mm": {"from": 2.0, "to": 1.0, "count": 3}}, "must rise"),
         ({"side_mm": {"from": 1.0, "to": 2.0}}, "must have a count"),
         ({"side_mm": -1.0}, "above zero"),
+        ({"side_mm": {"from": 1.0, "to": 2.0, "count": 10**12}}, "at most 1000000"),
+        ({"flux_mT": [50.0, -1e5]}, "within 30000 mT"),
         ({"sides_mm": [1.0]}, "did you mean 'side_mm'"),
         ({"flux_mT": None, "gap_mm": [60.0]}, "belong together"),
         ({"gap_mm": [60.0]}, "either flux_mT"),
