@@ -153,6 +153,11 @@ def _field(
     from ..sim import MagnetField, UniformField
 
     if flux_mT is not None and magnet is None and gap_mm is None:
+        if flux_mT == 0.0:
+            raise InputError(
+                "--field-mT must not be zero: without a field no rod bends; "
+                f"instead received {flux_mT:g} mT"
+            )
         return UniformField(flux_mT=flux_mT, angle_deg=angle_deg)
     if flux_mT is None and magnet is not None and gap_mm is not None:
         return MagnetField(magnet=read_magnet(magnet), gap_mm=gap_mm)
@@ -198,6 +203,9 @@ def _makeable(
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
         message = first["msg"].removeprefix("Value error, ")
+        if "instead received" not in message and first["type"] != "value_error":
+            message = f"{message[0].lower()}{message[1:]}; instead received "
+            message += repr(first["input"])
         raise InputError(f"{key}: {message}" if key else message) from None
 
 

@@ -207,6 +207,8 @@ def test_wrong_usage_is_one_sentence(tmp_path):
         (base[:2], InputError, "either --field-mT"),
         ([*base, "--length-mm", "100"], InputError, "do not add up"),
         ([*base, "--side-mm", "thick"], InputError, "number or LOW:HIGH"),
+        ([*base, "--side-mm", "-1"], InputError, "instead received -1.0"),
+        (["--radius-mm", "100", "--field-mT", "0"], InputError, "must not be zero"),
         ([*base, "--count", "0"], InputError, "count"),
         ([*base, "--figure", "a.gif"], InputError, "must end in"),
         (["--curve", str(curve), "--field-mT", "5"], ConfigError, "line 3"),
