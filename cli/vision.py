@@ -378,7 +378,7 @@ def _settings(
     lengths: dict[str, float | None],
     **others: Any,
 ) -> Settings:
-    from ..core.checks import finite
+    from ..core.checks import finite, positive
     from ..vision.batch import Settings, read_bare
     from ..vision.calibration import Calibration
 
@@ -388,14 +388,33 @@ def _settings(
         for name, value in lengths.items()
         if value is not None
     }
+    if length_mm := given.get("length_mm"):
+        positive(length_mm, "--length-mm", "mm")
     if known is not None:
         given.setdefault("rod_height_mm", known.rod_height_mm)
+        _below_the_camera(given["rod_height_mm"], known.camera_height_mm)
     return Settings(
         calibration=known,
         bare=None if bare is None else read_bare(bare),
         **given,
         **others,
     )
+
+
+def _below_the_camera(rod_height_mm: float, camera_height_mm: float) -> None:
+    """Refuse a rod that the camera could not see.
+
+    Raises
+    ------
+    InputError
+        If it is not between the board's plane, give or take a bench, and the lens.
+    """
+    if not abs(rod_height_mm) < camera_height_mm:
+        raise InputError(
+            "--rod-height-mm must be below the camera, which the calibration puts "
+            f"{camera_height_mm:.0f} mm above the board; instead received "
+            f"{rod_height_mm:g} mm"
+        )
 
 
 def _workers(pictures: int) -> int:

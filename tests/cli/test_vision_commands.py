@@ -178,6 +178,7 @@ def test_figure_and_edges_are_written(magbend, tmp_path, calibration):
         (["extract", BOARD, "--calibration", "none.json"], 1, "none.json"),
         (["extract", BOARD, "--joints-mm", "a,b"], 1, "--joints-mm"),
         (["extract", BOARD, "--rod-height-mm", "nan"], 1, "--rod-height-mm"),
+        (["extract", BOARD, "--length-mm", "-3"], 1, "--length-mm must be above zero"),
         (["extract", BOARD, "--figure-steps", "x.doc"], 1, ".pdf"),
         (["extract", BOARD, "--bare", "none.png"], 1, "none.png"),
         (["extract"], 2, "Missing argument"),
@@ -221,3 +222,13 @@ def test_help_names_an_example_and_loads_nothing_heavy():
     )
     assert done.returncode == 0, done.stderr
     assert "Example: magbend vision extract" in done.stdout
+
+
+def test_a_rod_above_the_camera_is_refused(magbend, calibration, tmp_path):
+    code, _, messages = magbend(
+        "vision", "extract", RENDERED / "dev_03.jpg", "--calibration", calibration,
+        "--rod-height-mm", 400, "--out", tmp_path / "out",
+    )  # fmt: skip
+    assert code == 1
+    assert "must be below the camera" in messages
+    assert not (tmp_path / "out").exists()
