@@ -52,6 +52,12 @@ def read_model(path: Path) -> tuple[dict[str, NDArray], dict[str, Any]]:
 def damaged(path: Path, what: str, error: Exception, way_out: str) -> StoreError:
     """Return the sentence for a damaged file."""
     reason = " ".join(str(error).split())[:120] or type(error).__name__
+    if "pickle" in reason:
+        reason = "it is no NumPy archive"
+    elif isinstance(error, KeyError):
+        reason = f"the entry {reason} is missing"
+    elif isinstance(error, OSError) and error.strerror:
+        reason = error.strerror
     return StoreError(
         f"{path}: is damaged or no {what} ({reason}); make it again with `{way_out}`"
     )
