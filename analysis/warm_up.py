@@ -17,11 +17,11 @@ import numpy as np
 
 def is_warm() -> bool:
     """Return whether the largest kernels are in the cache, so that nothing compiles."""
-    from ..sim.planar import solve_planar
+    from ..sim.planar import solve_rows
     from ..sim.solid_march import solve_from
     from ..vision.edges import _sample
 
-    for kernel in (solve_planar, solve_from, _sample):
+    for kernel in (solve_rows, solve_from, _sample):
         cache = getattr(kernel, "_cache", None)
         folder = Path(getattr(cache, "cache_path", ""))
         if not any(folder.glob(f"*{kernel.py_func.__name__}-*.nbi")):

@@ -63,6 +63,22 @@ class Centreline:
                 f"instead received {len(self.s_mm)} value(s) that do not increase"
             )
 
+    @classmethod
+    def _trusted(
+        cls,
+        s_mm: NDArray[np.float64],
+        x_mm: NDArray[np.float64],
+        y_mm: NDArray[np.float64],
+        theta_rad: NDArray[np.float64],
+        kappa_per_mm: NDArray[np.float64],
+    ) -> Centreline:
+        """Make one of arrays known to be right, without the checks (for solvers)."""
+        line = object.__new__(cls)
+        columns = (s_mm, x_mm, y_mm, theta_rad, kappa_per_mm)
+        for name, values in zip(COLUMNS, columns, strict=True):
+            object.__setattr__(line, name, values)
+        return line
+
     @property
     def length_mm(self) -> float:
         """Arc length from the first to the last point, in mm."""

@@ -15,7 +15,6 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.errors import InputError
@@ -25,8 +24,7 @@ from ..core.units import MU0
 from .batch_lanes import HARD, solve_magnet, solve_uniform
 from .fields import FLUX_LIMIT_T, PULLED_IN, STABLE, UNSTABLE
 from .magnet_field import magnet_block
-from .planar import GONE, OK_UNSTABLE, equilibrium, shape, sharpen, touches
-from .planar_march import MAX_ORDER, STATE
+from .planar import OK_UNSTABLE, TOUCHES, solve_planar_rows
 
 Array = NDArray[np.float64]
 
@@ -223,8 +221,7 @@ def _solve_chunk(
         hard = np.flatnonzero(outcome == HARD)
         fields = fields[hard]
     if len(hard):
-        found = (tips[hard], outcome[hard], error[hard], index[hard])
-        _solve_hard(rods[hard], fields, margins[hard], *found)
+        found = _solve_hard(rods[hard], fields, margins[hard])
         tips[hard], outcome[hard], error[hard], index[hard] = found
     out["tip_x_mm"][order] = tips[:, 0] * total_mm
     out["tip_y_mm"][order] = tips[:, 1] * total_mm
@@ -277,39 +274,20 @@ def _magnet_fields(magnet: Magnet, gap_mm: Array, total_mm: Array) -> Array:
     return fields
 
 
-@njit(cache=True, nogil=True)
-def _solve_hard(rods, fields, margins, tips, outcome, error, index):  # type: ignore[no-untyped-def]
-    """Solve the designs that left the lanes, one by one."""
-    X = np.empty(STATE)
-    D = np.empty((STATE, 4))
-    T = np.empty((4, MAX_ORDER + 1))
-    C = np.empty((MAX_ORDER + 1, 4, 4))
-    u = np.empty(4)
-    stations = np.linspace(0.0, 1.0, 41)
-    curve = np.empty((4, 41))
-    for i in range(rods.shape[0]):
-        u[0] = u[2] = u[3] = 0.0
-        u[1] = 1.0
-        tips[i] = np.nan
-        error[i] = np.nan
-        index[i] = -1
-        curve[0] = stations
-        curve[1] = 0.0
-        if touches(fields[i], curve[0], curve[1], margins[i]):
-            outcome[i] = 4
-            continue
-        found, zeros, _ = equilibrium(
-            rods[i], fields[i], 0.0, u, _ORDER, _STEP, X, D, T, C
-        )
-        outcome[i] = min(found, NOT_SOLVED)
-        if found > OK_UNSTABLE:
-            continue
-        wrong = sharpen(rods[i], fields[i], 0.0, u, _ORDER, _STEP, X, D, T, C)
-        shape(rods[i], fields[i], u, _ORDER + 4, _STEP, stations, X, D, T, C, curve)
-        if touches(fields[i], curve[0], curve[1], margins[i]):
-            outcome[i] = GONE
-            continue
-        index[i] = zeros
-        error[i] = wrong + 2e-14
-        for k in range(3):
-            tips[i, k] = curve[k, -1]
+def _solve_hard(
+    rods: Array, fields: Array, margins: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Solve the designs that left the lanes: tips, outcomes, errors, indices."""
+    stations = np.linspace(0.0, 1.0, 41)[None]
+    found, _, curves, _ = solve_planar_rows(
+        rods, fields, 0.0, margins, stations, _ORDER, _STEP
+    )
+    tips = curves[:, :3, -1]
+    outcome, index, error = found[:, 0], found[:, 1], found[:, 2]
+    gone = outcome > OK_UNSTABLE
+    touching = outcome == TOUCHES
+    outcome = np.where(touching, 4, np.minimum(outcome, NOT_SOLVED))
+    tips[gone] = np.nan
+    error[gone] = np.nan
+    index[gone] = -1
+    return tips, outcome, error, index

@@ -7,14 +7,12 @@ comparing with one bench.
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from ..core.errors import InputError
@@ -23,16 +21,7 @@ from ..core.specimen import Specimen
 from ..core.units import MU0
 from .fields import FLUX_LIMIT_T
 from .magnet_field import magnet_block
-from .planar import (
-    GONE,
-    OK_STABLE,
-    OK_UNSTABLE,
-    equilibrium,
-    shape,
-    sharpen,
-    touches,
-)
-from .planar_march import MAX_ORDER, STATE
+from .planar import GONE, OK_UNSTABLE, TOUCHES, solve_planar_rows
 
 Array = NDArray[np.float64]
 
@@ -171,7 +160,7 @@ def solve_shapes(
 
     Notes
     -----
-    Taylor order 10, corrected and bounded by order 14 (`planar.sharpen`), on all cores.
+    Taylor order 10, corrected and bounded by order 14 (`planar`), on all cores.
     """
     n, k = designs.length_mm.shape
     total_mm = designs.length_mm.sum(axis=1)
@@ -260,38 +249,27 @@ def _fields(designs: Designs, total_mm: Array) -> Array:
     return fields
 
 
-@njit(cache=True, nogil=True)
-def _solve(stations, rods, fields, total, margins, out, status, error):  # type: ignore[no-untyped-def]
-    points = stations.shape[1]
-    curve = np.empty((4, points))
-    X = np.empty(STATE)
-    D = np.empty((STATE, 4))
-    T = np.empty((4, MAX_ORDER + 1))
-    C = np.empty((MAX_ORDER + 1, 4, 4))
-    u = np.empty(4)
-    for i in range(rods.shape[0]):
-        u[0] = u[2] = u[3] = 0.0
-        u[1] = 1.0
-        curve[0] = stations[i]
-        curve[1] = 0.0
-        status[i] = 2
-        error[i] = math.nan
-        out[i] = math.nan
-        if touches(fields[i], curve[0], curve[1], margins[i]):
-            continue
-        outcome, _, _ = equilibrium(rods[i], fields[i], 0.0, u, ORDER, STEP, X, D, T, C)
-        if outcome > OK_UNSTABLE:
-            status[i] = 2 if outcome == GONE else 3
-            continue
-        wrong = sharpen(rods[i], fields[i], 0.0, u, ORDER, STEP, X, D, T, C)
-        shape(rods[i], fields[i], u, ORDER + 4, STEP, stations[i], X, D, T, C, curve)
-        if touches(fields[i], curve[0], curve[1], margins[i]):
-            continue
-        status[i] = 0 if outcome == OK_STABLE else 1
-        error[i] = wrong * total[i]
-        for j in range(points):
-            out[i, j, 0] = stations[i, j] * total[i]
-            out[i, j, 1] = curve[0, j] * total[i]
-            out[i, j, 2] = curve[1, j] * total[i]
-            out[i, j, 3] = curve[2, j]
-            out[i, j, 4] = curve[3, j] / total[i]
+def _solve(
+    stations: Array,
+    rods: Array,
+    fields: Array,
+    total: Array,
+    margins: Array,
+    out: Array,
+    status: NDArray[np.int8],
+    error: Array,
+) -> None:
+    found, _, curves, _ = solve_planar_rows(
+        rods, fields, 0.0, margins, stations, ORDER, STEP
+    )
+    outcome = found[:, 0].astype(np.int64)
+    good = outcome <= OK_UNSTABLE
+    gone = (outcome == GONE) | (outcome == TOUCHES)
+    status[:] = np.where(good, outcome, np.where(gone, 2, 3))
+    error[:] = np.where(good, found[:, 2] * total, np.nan)
+    out[:, :, 0] = stations * total[:, None]
+    out[:, :, 1] = curves[:, 0] * total[:, None]
+    out[:, :, 2] = curves[:, 1] * total[:, None]
+    out[:, :, 3] = curves[:, 2]
+    out[:, :, 4] = curves[:, 3] / total[:, None]
+    out[~good] = np.nan

@@ -22,28 +22,18 @@ import math
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from .magnet_field import inside
-from .planar_march import (
-    MAX_ORDER,
-    STATE,
-    WX,
-    WY,
-    E,
-    H,
-    M,
-    cross_joint,
-    enter_section,
-    field_at,
-    march,
-    start,
-    substeps,
-    taylor_step,
-)
+from .planar_march import MAX_ORDER, PART, STATE, WX, WY, E, H, M, march
 
-OK_STABLE, OK_UNSTABLE, GONE, FAILED, TOO_STRONG, TOUCHES = 0, 1, 2, 3, 4, 5
+Array = NDArray[np.float64]
+
+OK_STABLE, OK_UNSTABLE, GONE, FAILED, TOO_STRONG, TOUCHES, FOLLOW = range(7)
 """Outcomes: stable, unstable, no equilibrium, no convergence, load beyond `MAX_REACH`,
-undeformed rod touches the magnet."""
+undeformed rod touches the magnet; and, inside this module, load to be followed."""
+ITERATE, COMPARE, SHAPE = 0, 1, 2
+"""What a march of `_solve_row` is for."""
 
 MAX_REACH = 200.0
 """Largest sum of h sqrt(e P), the length of the rod in units of its boundary layer."""
@@ -61,7 +51,7 @@ SMALL = 1e-8
 MIN_LOAD_STEP = 1e-7
 
 
-@njit(cache=True)
+@njit(**PART)
 def solve3(D, rt, rx, ry, out):  # type: ignore[no-untyped-def]
     """Solve the 3x3 Newton system for minus the residual; return False if singular."""
     a = D[2, 1] * D[3, 2] - D[2, 2] * D[3, 1]
@@ -89,7 +79,7 @@ def solve3(D, rt, rx, ry, out):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True)
+@njit(**PART)
 def residual(u, clamp, X):  # type: ignore[no-untyped-def]
     """Return how far the root is from the clamp: angle, and position turned by -phi."""
     cf = math.cos(u[3])
@@ -101,37 +91,7 @@ def residual(u, clamp, X):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True)
-def newton(rod, field, load, clamp, u, order, step, first, X, D, T, C):  # type: ignore[no-untyped-def]
-    """Iterate u to an equilibrium; return (Morse index or -1, last contraction).
-
-    Gives up, rather than jump to another branch, when the first correction is above
-    `first` or a correction does not shrink to a quarter of the one before.
-    """
-    d = np.empty(3)
-    before = math.inf
-    for k in range(16):
-        if field[0] != 0.0 and inside(field[1:], u[1], u[2], 0.0, 0.0):
-            return -1
-        index = march(rod, field, load, u, order, step, 4, X, D, T, C)
-        rt, rx, ry = residual(u, clamp, X)
-        if not solve3(D, rt, rx, ry, d):
-            return -1
-        size = max(abs(d[0]), abs(d[1]), abs(d[2]))
-        if not size < SMALL and (
-            not size < first or (k > 0 and size > SHRINK * before)
-        ):
-            return -1
-        u[0] += d[0]
-        u[1] += d[1]
-        u[2] += d[2]
-        if size < SMALL:
-            return index
-        before = size
-    return -1
-
-
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def straight(clamp, u):  # type: ignore[no-untyped-def]
     """Set u to the unloaded rod, keeping its frame."""
     u[0] = clamp - u[3]
@@ -139,50 +99,99 @@ def straight(clamp, u):  # type: ignore[no-untyped-def]
     u[2] = math.sin(clamp)
 
 
-@njit(cache=True)
-def follow_load(rod, field, clamp, u, order, step, X, D, T, C):  # type: ignore[no-untyped-def]
-    """Follow the equilibrium from no load to full load; return (index, load).
+@njit(**PART)
+def _touches(field, margin, curve):  # type: ignore[no-untyped-def]
+    """Tell whether any point of a curve is within `margin` of the magnet."""
+    if field[0] == 0.0:
+        return False
+    found = False
+    for k in range(curve.shape[1]):
+        found = found or inside(field[1:], curve[0, k], curve[1, k], 0.0, margin)
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def newton(rod, field, load, clamp, u, order, step, first, X, D, T, C):  # type: ignore[no-untyped-def]
+    """Iterate u to an equilibrium; return its Morse index, or -1.
+
+    Gives up, rather than jump to another branch, when the first correction is above
+    `first` or a correction does not shrink to a quarter of the one before.
+    """
+    d = np.empty(3)
+    nowhere = np.empty(0)
+    nothing = np.empty((4, 0))
+    before = math.inf
+    columns = D.shape[1]
+    for _ in range(16):
+        if field[0] != 0.0 and inside(field[1:], u[1], u[2], 0.0, 0.0):
+            return -1
+        index = march(
+            rod, field, load, u, order, step, columns, math.inf, nowhere, 0,
+            X, D, T, C, nothing,
+        )  # fmt: skip
+        rt, rx, ry = residual(u, clamp, X)
+        if not solve3(D, rt, rx, ry, d):
+            return -1
+        size = max(abs(d[0]), abs(d[1]), abs(d[2]))
+        if not size < SMALL and (not size < first or size > SHRINK * before):
+            return -1
+        for i in range(3):
+            u[i] += d[i]
+        if size < SMALL:
+            return index
+        before = size
+    return -1
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def follow_load(rod, field, clamp, u, order, step):  # type: ignore[no-untyped-def]
+    """Follow the equilibrium from no load to full load in u; return (index, load).
 
     The index is -1 where the branch folds back, -2 where it takes too many steps.
     """
-    trials = 0
-    straight(clamp, u)
-    load = 0.0
-    jump = 0.25
-    here = u.copy()
+    X = np.empty(STATE)
+    D = np.empty((STATE, 4))
+    T = np.empty((4, MAX_ORDER + 1))
+    C = np.empty((MAX_ORDER + 1, 4, 4))
     tangent = np.zeros(3)
-    index = newton(rod, field, 0.0, clamp, u, order, step, 1.0, X, D, T, C)
-    while load < 1.0:
-        solve3(D, D[0, 3], D[2, 3], D[3, 3], tangent)
-        here[:] = u
-        while True:
-            jump = min(jump, 1.0 - load)
-            for i in range(3):
-                u[i] = here[i] + jump * tangent[i]
-            u[3] = here[3]
-            bend = jump * max(abs(tangent[0]), abs(tangent[1]), abs(tangent[2]))
-            trial = -1
-            if bend < 0.5:
-                trial = newton(
-                    rod, field, load + jump, clamp, u, order, step, 0.1, X, D, T, C
-                )
-            if trial >= 0 and abs(trial - index) <= 1:
-                break
+    u[3] = 0.0
+    straight(clamp, u)
+    here = u.copy()
+    trials = 0
+    index = 0
+    load = 0.0
+    jump = 0.0
+    while True:
+        for i in range(3):
+            u[i] = here[i] + jump * tangent[i]
+        u[3] = here[3]
+        bend = jump * max(abs(tangent[0]), abs(tangent[1]), abs(tangent[2]))
+        trial = -1
+        if bend < 0.5:
+            first = 0.1 if jump > 0.0 else 1.0
+            trial = newton(
+                rod, field, load + jump, clamp, u, order, step, first, X, D, T, C
+            )
+        if trial >= 0 and abs(trial - index) <= 1:
+            if jump == 1.0 - load:
+                return trial, 1.0
+            index = trial
+            load += jump
+            for i in range(4):
+                here[i] = u[i]
+            solve3(D, D[0, 3], D[2, 3], D[3, 3], tangent)
+            jump = 2.0 * jump if jump > 0.0 else 0.25
+        else:
             jump *= 0.5
             trials += 1
             if trials > MAX_TRIALS:
                 return -2, load
             if jump < MIN_LOAD_STEP:
-                u[:] = here
                 return -1, load
-            # The columns at `here` are gone, but only its tangent is needed again.
-        index = trial
-        load = 1.0 if jump == 1.0 - load else load + jump
-        jump *= 2.0
-    return index, 1.0
+        jump = min(jump, 1.0 - load)
 
 
-@njit(cache=True)
+@njit(**PART)
 def one_sided(rod, field):  # type: ignore[no-untyped-def]
     """Tell whether the first road applies: uniform field, one sign, no weight."""
     if field[0] != 0.0 or rod[0, M] == 0.0:
@@ -193,193 +202,269 @@ def one_sided(rod, field):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True)
-def pendulum(rod, flux, gamma, order, step, X, D, T, C):  # type: ignore[no-untyped-def]
-    """March gamma alone; return False as soon as it passes pi."""
-    X[:] = 0.0
-    X[0] = gamma
-    D[:, :] = 0.0
-    D[0, 0] = 1.0
+@njit(**PART)
+def _reach(rod, flux):  # type: ignore[no-untyped-def]
+    """Return the sum of h sqrt(e P) in a field of `flux`."""
+    reach = 0.0
     for i in range(rod.shape[0]):
-        X[4] = abs(rod[i, M]) * flux
-        X[6] = rod[i, E]
-        n = substeps(rod[i, H], X, step)
-        for _ in range(n):
-            taylor_step(rod[i, H] / n, order, X, D, 1, T, C)
-            if not X[0] < math.pi:
-                return False
-    return True
+        p = abs(rod[i, M]) * flux + math.hypot(rod[i, WX], rod[i, WY])
+        reach += rod[i, H] * math.sqrt(rod[i, E] * p)
+    return reach
 
 
-@njit(cache=True)
-def bracketed(rod, field, clamp, u, order, step, X, D, T, C):  # type: ignore[no-untyped-def]
-    """Find the equilibrium of a one-sided rod; return its index, or -1."""
-    flux = math.hypot(field[1], field[2])
+@njit(**PART)
+def _first_guess(rod, field, clamp, u, bracket):  # type: ignore[no-untyped-def]
+    """Set u and the bracket (low, high, guess, goal, side) of a one-sided rod.
+
+    Return the angle from the load at which a march may stop: pi, but for a rod that
+    starts against the field and stays there.
+    """
     sign = 1.0 if rod[0, M] > 0.0 else -1.0
     u[3] = math.atan2(sign * field[2], sign * field[1])
     target = clamp - u[3]
     target -= 2.0 * math.pi * math.floor(target / (2.0 * math.pi) + 0.5)
     u[3] = clamp - target
     side = -1.0 if target < 0.0 else 1.0
-    target = abs(target)
-    if flux == 0.0 or target == 0.0 or target > math.pi - 1e-12:
-        u[0] = side * target
-        return march(rod, field, 1.0, u, order, step, 1, X, D, T, C)
-    reach = 0.0
-    for i in range(rod.shape[0]):
-        reach += rod[i, H] * math.sqrt(rod[i, E] * abs(rod[i, M]) * flux)
-    goal = math.tan(0.25 * target)
-    low = 0.0
-    high = goal
-    t = goal / math.cosh(reach)
-    for _ in range(200):
-        gamma = 4.0 * math.atan(t)
-        if pendulum(rod, flux, gamma, order, step, X, D, T, C):
-            g = math.tan(0.25 * X[0])
-            if g > goal:
-                high = t
-            else:
-                low = t
-            slope = D[0, 0] * (1.0 + g * g) / (1.0 + t * t)
-            new = t - (g - goal) / slope
-            if abs(new - t) <= SMALL * t:
-                u[0] = side * 4.0 * math.atan(new)
-                return 0
-        else:
+    goal = math.tan(0.25 * abs(target))
+    guess = goal / math.cosh(_reach(rod, math.hypot(field[1], field[2])))
+    bracket[0] = 0.0
+    bracket[1] = goal
+    bracket[2] = guess
+    bracket[3] = goal
+    bracket[4] = side
+    u[0] = side * 4.0 * math.atan(guess)
+    if abs(target) > math.pi - 1e-12:
+        u[0] = target
+        return math.inf
+    return math.pi
+
+
+@njit(**PART)
+def _narrow(passed, X, D, u, bracket):  # type: ignore[no-untyped-def]
+    """Improve the bracketed guess by what a march found; return whether it is done."""
+    low, high, t, goal, side = (
+        bracket[0], bracket[1], bracket[2], bracket[3], bracket[4],
+    )  # fmt: skip
+    new = -1.0
+    if passed:
+        high = t
+    else:
+        g = math.tan(0.25 * side * X[0])
+        if g > goal:
             high = t
-            new = -1.0
-        if not low < new < high:
-            new = math.sqrt(low * high) if low > 0.0 else 0.1 * high
-        t = new
-    return -1
+        else:
+            low = t
+        new = t - (g - goal) * (1.0 + t * t) / (D[0, 0] * (1.0 + g * g))
+    done = not passed and abs(new - t) <= SMALL * t
+    if not done and not low < new < high:
+        new = math.sqrt(low * high) if low > 0.0 else 0.1 * high
+    bracket[0] = low
+    bracket[1] = high
+    bracket[2] = new
+    u[0] = side * 4.0 * math.atan(new)
+    return done
 
 
-@njit(cache=True)
-def shape(rod, field, u, order, step, s, X, D, T, C, out):  # type: ignore[no-untyped-def]
-    """Fill `out` (4, n) with x, y, theta, curvature at the ascending stations `s`.
+@njit(**PART)
+def _correct(columns, clamp, u, X, D, d):  # type: ignore[no-untyped-def]
+    """Set d to Newton's correction; return the residual (infinite if singular)."""
+    rt, rx, ry = residual(u, clamp, X)
+    if columns == 1:
+        d[0] = -rt / D[0, 0]
+        d[1] = d[2] = 0.0
+        return abs(rt)
+    if not solve3(D, rt, rx, ry, d):
+        return math.inf
+    return abs(rt) + abs(rx) + abs(ry)
 
-    At a joint the curvature is the one of the section that begins there.
-    """
-    start(rod, field, 1.0, u, 0, X, D)
+
+@njit(**PART)
+def _solve_row(
+    rod, field, clamp, margin, s, order, step, cold, u, found, out, X, D, T, C, d
+):  # type: ignore[no-untyped-def]
+    """Solve one rod into `found` and `out` (see `solve_rows`)."""
+    bracket = np.empty(5)
+    if cold:
+        u[3] = 0.0
+        straight(clamp, u)
+        for k in range(s.shape[0]):
+            out[0, k] = s[k] * math.cos(clamp)
+            out[1, k] = s[k] * math.sin(clamp)
+    simple = one_sided(rod, field)
+    limit = math.inf
+    if simple:
+        limit = _first_guess(rod, field, clamp, u, bracket)
+    columns = 1 if simple else 4
+    stage = ITERATE
+    index = 0
+    before = math.inf
+    error = 0.0
+    if cold and _touches(field, margin, out):
+        found[0] = TOUCHES
+        return
+    found[0] = FAILED
+    for k in range(220):
+        free = simple or stage != ITERATE or field[0] == 0.0
+        if not free and inside(field[1:], u[1], u[2], 0.0, 0.0):
+            break
+        zeros = march(
+            rod, field, 1.0, u,
+            order if stage == ITERATE else order + 4, step,
+            columns if stage == ITERATE else 0,
+            limit if stage == ITERATE else math.inf,
+            s, s.shape[0] if stage == SHAPE else 0, X, D, T, C, out,
+        )  # fmt: skip
+        if k == 0 and cold:
+            found[3] = X[9]
+            found[4] = X[10]
+            most = MAX_REACH if simple else MAX_REACH_NEWTON
+            if not _reach(rod, math.hypot(X[9], X[10])) < most:
+                found[0] = TOO_STRONG
+                return
+        if stage == SHAPE:
+            break
+        if stage == ITERATE and simple:
+            if limit > 4.0:
+                index = zeros
+                stage = COMPARE
+            elif _narrow(zeros < 0, X, D, u, bracket):
+                stage = COMPARE
+            continue
+        size = _correct(columns, clamp, u, X, D, d)
+        change = max(abs(d[0]), abs(d[1]), abs(d[2]))
+        if stage == COMPARE:
+            error = size + abs(d[0]) + abs(d[1]) + abs(d[2])
+            stage = SHAPE
+        elif change < SMALL and size < math.inf:
+            index = zeros
+            stage = COMPARE
+        elif not change < (1.0 if cold else 0.1) or change > SHRINK * before or k > 14:
+            break
+        before = change
+        for a in range(3):
+            u[a] += d[a]
+    if stage != SHAPE or (cold and index != 0 and not simple):
+        if not simple and cold:
+            found[0] = FOLLOW
+        return
+    _place(u, X, out)
+    found[0] = OK_STABLE if index == 0 else OK_UNSTABLE
+    if _touches(field, margin, out):
+        found[0] = GONE
+    found[1] = index
+    found[2] = error + ROUNDING
+    found[3] = X[9]
+    found[4] = X[10]
+    found[5] = -X[1]
+
+
+@njit(**PART)
+def _place(u, X, out):  # type: ignore[no-untyped-def]
+    """Turn the curve, which counts from the tip, so that it counts from the clamp."""
     cf = math.cos(u[3])
     sf = math.sin(u[3])
-    k = s.shape[0] - 1
-    reached = 0.0
-    for i in range(rod.shape[0]):
-        enter_section(rod, i, 1.0, cf, sf, 0, X, D)
-        n = substeps(rod[i, H], X, step)
-        h = rod[i, H] / n
-        for j in range(n):
-            x0 = X[2]
-            y0 = X[3]
-            taylor_step(h, order, X, D, 0, T, C)
-            last = i + 1 == rod.shape[0] and j + 1 == n
-            while k >= 0 and (last or 1.0 - s[k] <= reached + h + 1e-13):
-                r = (1.0 - s[k] - reached) / h
-                theta = q = x = y = 0.0
-                for a in range(order, -1, -1):
-                    theta = theta * r + T[0, a]
-                    q = q * r + T[1, a]
-                for a in range(order - 1, -1, -1):
-                    x = x * r + T[3, a] / (a + 1)
-                    y = y * r + T[2, a] / (a + 1)
-                out[0, k] = x0 - h * r * x
-                out[1, k] = y0 - h * r * y
-                out[2, k] = theta + u[3]
-                out[3, k] = -q * X[6]
-                k -= 1
-            reached += h
-        if i + 1 < rod.shape[0]:
-            cross_joint(rod, field, i, 1.0, u, cf, sf, 0, X, D)
-    for k in range(s.shape[0]):
+    n = out.shape[1]
+    for k in range(n):
         x = out[0, k] - X[2]
         y = out[1, k] - X[3]
         out[0, k] = cf * x - sf * y
         out[1, k] = sf * x + cf * y
+    u[1] = out[0, n - 1]
+    u[2] = out[1, n - 1]
 
 
-@njit(cache=True)
-def equilibrium(rod, field, clamp, u, order, step, X, D, T, C):  # type: ignore[no-untyped-def]
-    """Find the equilibrium of full load; return (outcome, index, load)."""
-    reach = 0.0
-    b = field_at(field, u[1], u[2])
-    flux = math.hypot(b[0], b[1])
-    for i in range(rod.shape[0]):
-        p = abs(rod[i, M]) * flux + math.hypot(rod[i, WX], rod[i, WY])
-        reach += rod[i, H] * math.sqrt(rod[i, E] * p)
-    simple = one_sided(rod, field)
-    if not reach < (MAX_REACH if simple else MAX_REACH_NEWTON):
-        return TOO_STRONG, -1, 0.0
-    load = 1.0
-    if simple:
-        index = bracketed(rod, field, clamp, u, order, step, X, D, T, C)
-    else:
-        index = newton(rod, field, 1.0, clamp, u, order, step, 1.0, X, D, T, C)
-        if index != 0:
-            u[3] = 0.0
-            index, load = follow_load(rod, field, clamp, u, order, step, X, D, T, C)
-            if index < 0:
-                return (GONE if index == -1 else FAILED), -1, load
-    if index < 0:
-        return FAILED, -1, load
-    return (OK_STABLE if index == 0 else OK_UNSTABLE), index, load
-
-
-@njit(cache=True)
-def sharpen(rod, field, clamp, u, order, step, X, D, T, C):  # type: ignore[no-untyped-def]
-    """Correct u by what an order four higher finds; return the size of it.
-
-    The correction bounds the truncation error of `order`; what is returned adds what
-    rounding leaves.
-    """
-    d = np.zeros(3)
-    if one_sided(rod, field):
-        march(rod, field, 1.0, u, order, step, 1, X, D, T, C)
-        slope = D[0, 0]
-        march(rod, field, 1.0, u, order + 4, step, 0, X, D, T, C)
-        r = X[0] + u[3] - clamp
-        d[0] = -r / slope
-        size = abs(r) + abs(d[0])
-        u[0] += d[0]
-        return size
-    march(rod, field, 1.0, u, order, step, 4, X, D, T, C)
-    J = D.copy()
-    march(rod, field, 1.0, u, order + 4, step, 0, X, D, T, C)
-    rt, rx, ry = residual(u, clamp, X)
-    solve3(J, rt, rx, ry, d)
-    u[0] += d[0]
-    u[1] += d[1]
-    u[2] += d[2]
-    return abs(rt) + abs(rx) + abs(ry) + abs(d[0]) + abs(d[1]) + abs(d[2])
-
-
-@njit(cache=True)
-def touches(field, x, y, margin):  # type: ignore[no-untyped-def]
-    """Tell whether any point of a curve is within `margin` of the magnet."""
-    if field[0] == 0.0:
-        return False
-    found = False
-    for k in range(x.shape[0]):
-        found = found or inside(field[1:], x[k], y[k], 0.0, margin)
-    return found
-
-
-@njit(cache=True)
-def solve_planar(rod, field, clamp, margin, s, order, step):  # type: ignore[no-untyped-def]
-    """Solve one rod.
+@njit(cache=True, nogil=True, error_model="numpy")
+def solve_rows(rods, fields, clamp, margins, s, order, step, cold, u, found, out):  # type: ignore[no-untyped-def]
+    """Solve many rods where no load need be followed.
 
     Parameters
     ----------
-    rod, field : ndarray
+    rods, fields : ndarray, shapes (n, k, 5), (n, 17)
         See `planar_march`.
     clamp : float
         Tangent angle at the clamp, in rad.
-    margin : float
+    margins : ndarray, shape (n,)
         Half the side of the rod: nearer to the magnet than this, it touches.
-    s : ndarray, shape (n,)
-        Stations, ascending from 0 to 1.
+    s : ndarray, shape (n, m) or (1, m)
+        Stations of each rod, or of all.
     order, step : int, float
         Order of the Taylor series and size of its steps.
+    cold : bool
+        Whether to start from the straight rod rather than from `u`.
+    u : ndarray, shape (n, 4)
+        Receives the unknowns (gamma, x_L, y_L, phi) of the march.
+    found : ndarray, shape (n, 6)
+        Receives outcome, Morse index, error, Bx and By at the tip, root moment.
+    out : ndarray, shape (n, 4, m)
+        Receives x, y, theta, curvature.
+    """
+    X = np.empty(STATE)
+    D = np.empty((STATE, 4))
+    T = np.empty((4, MAX_ORDER + 1))
+    C = np.empty((MAX_ORDER + 1, 4, 4))
+    d = np.empty(3)
+    for i in range(rods.shape[0]):
+        _solve_row(
+            rods[i], fields[i], clamp, margins[i], s[min(i, s.shape[0] - 1)], order,
+            step, cold, u[i], found[i], out[i], X, D, T, C, d,
+        )  # fmt: skip
+
+
+def solve_planar_rows(
+    rods: Array,
+    fields: Array,
+    clamp: float,
+    margins: Array,
+    s: Array,
+    order: int,
+    step: float,
+) -> tuple[Array, Array, Array, Array]:
+    """Solve many rods (arguments as of `solve_rows`).
+
+    Returns
+    -------
+    found : ndarray, shape (n, 6)
+        Outcome, Morse index (-1: none), error, Bx and By at the tip, root moment.
+    load : ndarray, shape (n,)
+        Load reached: 1 but where the outcome is no equilibrium.
+    out : ndarray, shape (n, 4, m)
+        x, y, theta, curvature.
+    u : ndarray, shape (n, 4)
+        The unknowns of the march.
+    """
+    n = len(rods)
+    found = np.zeros((n, 6))
+    out = np.empty((n, 4, s.shape[1]))
+    u = np.empty((n, 4))
+    load = np.ones(n)
+    solve_rows(rods, fields, clamp, margins, s, order, step, True, u, found, out)
+    if (found[:, 0] > OK_UNSTABLE).any():
+        load[found[:, 0] > OK_UNSTABLE] = 0.0
+        found[found[:, 0] > OK_UNSTABLE, 1] = -1.0
+        for i in np.flatnonzero(found[:, 0] == FOLLOW):
+            index, load[i] = follow_load(rods[i], fields[i], clamp, u[i], order, step)
+            if index < 0:
+                found[i, 0] = GONE if index == -1 else FAILED
+                continue
+            k = slice(i, i + 1)
+            here = s if len(s) == 1 else s[k]
+            solve_rows(
+                rods[k], fields[k], clamp, margins[k], here, order, step, False,
+                u[k], found[k], out[k],
+            )  # fmt: skip
+    return found, load, out, u
+
+
+def solve_planar(
+    rod: Array,
+    field: Array,
+    clamp: float,
+    margin: float,
+    s: Array,
+    order: int,
+    step: float,
+) -> tuple[int, int, float, float, float, float, float, Array, Array]:
+    """Solve one rod.
 
     Returns
     -------
@@ -388,26 +473,10 @@ def solve_planar(rod, field, clamp, margin, s, order, step):  # type: ignore[no-
         the shape (4, n): x, y, theta, curvature, and the unknowns (gamma, x_L, y_L,
         phi) of the march.
     """
-    out = np.empty((4, s.shape[0]))
-    X = np.empty(STATE)
-    D = np.empty((STATE, 4))
-    T = np.empty((4, MAX_ORDER + 1))
-    C = np.empty((MAX_ORDER + 1, 4, 4))
-    u = np.zeros(4)
-    straight(clamp, u)
-    out[0] = s * math.cos(clamp)
-    out[1] = s * math.sin(clamp)
-    if touches(field, out[0], out[1], margin):
-        return TOUCHES, -1, 0.0, 0.0, 0.0, 0.0, 0.0, out, u
-    outcome, index, load = equilibrium(rod, field, clamp, u, order, step, X, D, T, C)
-    if outcome > OK_UNSTABLE:
-        b = field_at(field, math.cos(clamp), math.sin(clamp))
-        return outcome, -1, load, 0.0, b[0], b[1], 0.0, out, u
-    error = sharpen(rod, field, clamp, u, order, step, X, D, T, C)
-    shape(rod, field, u, order + 4, step, s, X, D, T, C, out)
-    if touches(field, out[0], out[1], margin):
-        outcome = GONE
-    u[1] = out[0, -1]
-    u[2] = out[1, -1]
-    b = field_at(field, u[1], u[2])
-    return outcome, index, load, error + ROUNDING, b[0], b[1], -X[1], out, u
+    found, load, out, u = solve_planar_rows(
+        rod[None], field[None], clamp, np.array([margin]), s[None], order, step
+    )
+    outcome, index, error, bx, by, moment = found[0].tolist()
+    return (
+        int(outcome), int(index), float(load[0]), error, bx, by, moment, out[0], u[0],
+    )  # fmt: skip

@@ -17,9 +17,13 @@ and only as a number of its own, not as a difference of angles, does it keep its
 
 A rod is an array (n, 5), tip first: length h, compliance e, magnetic load m per tesla
 and weight per length wx, wy. A field is an array (17,): 0 and (Bx, By), or 1 and the
-magnet's block (`magnet_field.magnet_block`) in lengths of L. The state X, shape (9,),
-holds theta, q, x, y, Px, Py and what acts within a section: e, wx, wy. The columns D,
-shape (9, c), hold its derivatives.
+magnet's block (`magnet_field.magnet_block`) in lengths of L. The state X, shape (11,),
+holds theta, q, x, y, Px, Py, what acts within a section: e, wx, wy, and the flux
+density at the tip. The columns D, shape (11, c), hold derivatives of the first nine.
+
+The kernels have ``inline="always"``: they become parts of the few kernels that Python
+calls, each of which holds one march in one place. As functions of their own they would
+be compiled and optimised again for each of their callers, and for theirs.
 """
 
 from __future__ import annotations
@@ -30,11 +34,18 @@ from numba import njit
 
 from .magnet_field import plane_flux
 
+PART = {
+    "cache": True,
+    "error_model": "numpy",
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+}
+"""Options of a function that only kernels call."""
 UNIFORM = 0.0
 CUBOID = 1.0
 H, E, M, WX, WY = 0, 1, 2, 3, 4
 """Columns of a rod."""
-STATE = 9
+STATE = 11
 """Length of the state and rows of the column array."""
 MAX_ORDER = 24
 MOST_STEPS = 1500
@@ -43,7 +54,7 @@ SERIES = 4
 """Series kept of a step: theta, q, sin, cos; and the same of every column."""
 
 
-@njit(cache=True)
+@njit(**PART)
 def field_at(field, x, y):  # type: ignore[no-untyped-def]
     """Return (Bx, By, Gxx, Gxy, Gyy) of a field array."""
     if field[0] == 0.0:
@@ -51,7 +62,7 @@ def field_at(field, x, y):  # type: ignore[no-untyped-def]
     return plane_flux(field[1:], x, y)
 
 
-@njit(cache=True)
+@njit(**PART)
 def taylor_step(h, order, X, D, columns, T, C):  # type: ignore[no-untyped-def]
     """Advance state X and columns D by `h`, leaving the series in T and C.
 
@@ -61,9 +72,9 @@ def taylor_step(h, order, X, D, columns, T, C):  # type: ignore[no-untyped-def]
         Length of the step.
     order : int
         Order of the series.
-    X : ndarray, shape (9,)
+    X : ndarray, shape (11,)
         The state.
-    D : ndarray, shape (9, columns or more)
+    D : ndarray, shape (11, columns or more)
         Derivatives of the state.
     columns : int
         How many columns of D are in use.
@@ -111,7 +122,7 @@ def taylor_step(h, order, X, D, columns, T, C):  # type: ignore[no-untyped-def]
     X[5] += h * X[8]
 
 
-@njit(cache=True)
+@njit(**PART)
 def _column_step(h, order, X, D, columns, T, C):  # type: ignore[no-untyped-def]
     """Advance the columns over one step whose own series is in T."""
     he = h * X[6]
@@ -158,7 +169,7 @@ def _column_step(h, order, X, D, columns, T, C):  # type: ignore[no-untyped-def]
         D[5, a] += h * D[8, a]
 
 
-@njit(cache=True)
+@njit(**PART)
 def substeps(h, X, step):  # type: ignore[no-untyped-def]
     """Return how many Taylor steps a section needs.
 
@@ -175,57 +186,11 @@ def substeps(h, X, step):  # type: ignore[no-untyped-def]
     return max(1, math.ceil(z / step))
 
 
-@njit(cache=True)
-def start(rod, field, load, u, columns, X, D):  # type: ignore[no-untyped-def]
-    """Set state and columns at the tip, in a frame turned into the tip's load.
-
-    u = (gamma, x_L, y_L, phi): gamma and phi are updated to the load at (x_L, y_L).
-    """
-    b = field_at(field, u[1], u[2])
-    scale = load * rod[0, M]
-    size = abs(scale) * math.hypot(b[0], b[1])
-    if size > 0.0:
-        turn = math.atan2(scale * b[1], scale * b[0]) - u[3]
-        turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
-        u[0] -= turn
-        u[3] += turn
-    X[:] = 0.0
-    X[0] = u[0]
-    X[4] = size
-    D[:, :] = 0.0
-    if columns > 0:
-        D[0, 0] = 1.0
-    if columns > 1:
-        cf = math.cos(u[3])
-        sf = math.sin(u[3])
-        D[2, 1] = cf
-        D[3, 1] = -sf
-        D[2, 2] = sf
-        D[3, 2] = cf
-        move_load(scale, rod[0, M], b, cf, sf, columns, D)
-
-
-@njit(cache=True)
-def move_load(scaled, m, b, cf, sf, columns, D):  # type: ignore[no-untyped-def]
-    """Add to the columns how a load m B(r) changes as its point moves with the rod.
-
-    Column 3, if in use, is the derivative with respect to the load factor.
-    """
-    for a in range(columns):
-        dx = cf * D[2, a] - sf * D[3, a]
-        dy = sf * D[2, a] + cf * D[3, a]
-        fx = scaled * (b[2] * dx + b[3] * dy)
-        fy = scaled * (b[3] * dx + b[4] * dy)
-        if a == 3:
-            fx += m * b[0]
-            fy += m * b[1]
-        D[4, a] += cf * fx + sf * fy
-        D[5, a] += cf * fy - sf * fx
-
-
-@njit(cache=True)
-def enter_section(rod, i, load, cf, sf, columns, X, D):  # type: ignore[no-untyped-def]
+@njit(**PART)
+def enter_section(rod, i, load, u, columns, X, D):  # type: ignore[no-untyped-def]
     """Set what acts within section `i`: compliance and weight, turned by -phi."""
+    cf = math.cos(u[3])
+    sf = math.sin(u[3])
     wx = cf * rod[i, WX] + sf * rod[i, WY]
     wy = cf * rod[i, WY] - sf * rod[i, WX]
     X[6] = rod[i, E]
@@ -236,25 +201,106 @@ def enter_section(rod, i, load, cf, sf, columns, X, D):  # type: ignore[no-untyp
         D[8, 3] = wy
 
 
-@njit(cache=True)
-def cross_joint(rod, field, i, load, u, cf, sf, columns, X, D):  # type: ignore[no-untyped-def]
-    """Add the load of the joint between sections `i` and `i + 1` (root side)."""
-    m = rod[i + 1, M] - rod[i, M]
-    if m == 0.0:
+@njit(**PART)
+def begin(u, columns, X, D):  # type: ignore[no-untyped-def]
+    """Set state and columns at the free tip."""
+    for r in range(STATE):
+        X[r] = 0.0
+        for a in range(columns):
+            D[r, a] = 0.0
+    X[0] = u[0]
+    if columns > 0:
+        D[0, 0] = 1.0
+
+
+@njit(**PART)
+def turn_frame(b, scale, u, X, columns, D):  # type: ignore[no-untyped-def]
+    """Turn the frame into the tip's load, keeping the tip's direction; set its columns.
+
+    A turn as small as rounding is left out: gamma may be smaller still.
+    """
+    turn = math.atan2(scale * b[1], scale * b[0]) - u[3]
+    turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
+    if (b[0] != 0.0 or b[1] != 0.0) and scale != 0.0 and abs(turn) > 4e-15:
+        u[0] -= turn
+        u[3] += turn
+        X[0] = u[0]
+    if columns > 1:
+        cf = math.cos(u[3])
+        sf = math.sin(u[3])
+        D[2, 1] = cf
+        D[3, 1] = -sf
+        D[2, 2] = sf
+        D[3, 2] = cf
+    X[9] = b[0]
+    X[10] = b[1]
+
+
+@njit(**PART)
+def add_load(rod, field, i, load, u, columns, X, D):  # type: ignore[no-untyped-def]
+    """Add the load m B(r) where section `i` begins, seen from the tip.
+
+    At the tip itself (`i` = 0) the frame is turned into the load first. There, and
+    everywhere in a uniform field, the load is along the frame's x exactly. Column 3, if
+    in use, is the derivative with respect to the load factor.
+    """
+    m = rod[i, M] - rod[i - 1, M] if i > 0 else rod[i, M]
+    if i > 0 and m == 0.0:
         return
+    cf = math.cos(u[3])
+    sf = math.sin(u[3])
     x = u[1] + cf * X[2] - sf * X[3]
     y = u[2] + sf * X[2] + cf * X[3]
     b = field_at(field, x, y)
-    fx = load * m * b[0]
-    fy = load * m * b[1]
-    X[4] += cf * fx + sf * fy
-    X[5] += cf * fy - sf * fx
-    if columns > 1:
-        move_load(load * m, m, b, cf, sf, columns, D)
+    if i == 0:
+        turn_frame(b, load * m, u, X, columns, D)
+        cf = math.cos(u[3])
+        sf = math.sin(u[3])
+    along = cf * b[0] + sf * b[1]
+    across = cf * b[1] - sf * b[0]
+    if load * m != 0.0 and (i == 0 or (field[0] == 0.0 and rod[0, M] != 0.0)):
+        across = 0.0
+    X[4] += load * m * along
+    X[5] += load * m * across
+    if columns < 2:
+        return
+    for a in range(columns):
+        dx = cf * D[2, a] - sf * D[3, a]
+        dy = sf * D[2, a] + cf * D[3, a]
+        fx = load * m * (b[2] * dx + b[3] * dy)
+        fy = load * m * (b[3] * dx + b[4] * dy)
+        if a == 3:
+            fx += m * b[0]
+            fy += m * b[1]
+        D[4, a] += cf * fx + sf * fy
+        D[5, a] += cf * fy - sf * fx
 
 
-@njit(cache=True)
-def march(rod, field, load, u, order, step, columns, X, D, T, C):  # type: ignore[no-untyped-def]
+@njit(**PART)
+def sample(s, k, reached, h, last, order, x0, y0, phi, X, T, out):  # type: ignore[no-untyped-def]
+    """Fill `out` at the stations within a step; return the next station, or -1.
+
+    At a joint the curvature is the one of the section that begins there.
+    """
+    while k >= 0 and (last or 1.0 - s[k] <= reached + h + 1e-13):
+        r = (1.0 - s[k] - reached) / h
+        theta = q = x = y = 0.0
+        for a in range(order, -1, -1):
+            theta = theta * r + T[0, a]
+            q = q * r + T[1, a]
+        for a in range(order - 1, -1, -1):
+            x = x * r + T[3, a] / (a + 1)
+            y = y * r + T[2, a] / (a + 1)
+        out[0, k] = x0 - h * r * x
+        out[1, k] = y0 - h * r * y
+        out[2, k] = theta + phi
+        out[3, k] = -q * X[6]
+        k -= 1
+    return k
+
+
+@njit(**PART)
+def march(rod, field, load, u, order, step, columns, limit, s, count, X, D, T, C, out):  # type: ignore[no-untyped-def]
     """March from the tip to the root.
 
     Parameters
@@ -268,41 +314,54 @@ def march(rod, field, load, u, order, step, columns, X, D, T, C):  # type: ignor
     order, step : int, float
         Order of the series, and what one step takes (`substeps`).
     columns : int
-        0: none. 1: d/dgamma. 4: also d/dx_L, d/dy_L and d/dload.
-    X : ndarray, shape (9,)
+        0: none, and D is kept. 1: d/dgamma. 4: also d/dx_L, d/dy_L and d/dload.
+    limit : float
+        Angle from the load at which the march stops.
+    s, count : ndarray, int
+        The first `count` stations are filled into `out`.
+    X : ndarray, shape (11,)
         On return the state at the root; positions count from the tip, turned by -phi.
-    D : ndarray, shape (9, 4)
+    D : ndarray, shape (11, 4)
         On return its columns; those of the position count from the origin.
     T, C : ndarray
         Work space of `taylor_step`.
+    out : ndarray, shape (4, n)
+        x, y (as in X), theta and curvature at the stations.
 
     Returns
     -------
     int
         Number of sign changes of the Jacobi determinant on (0, L]: the Morse index, if
-        this is an equilibrium. (The variations of rods clamped at s form nested spaces
-        as s falls from L to 0, so each zero adds one unstable direction.)
+        this is an equilibrium; -1 if it stopped at `limit`. (The variations of rods
+        clamped at s form nested spaces as s falls from L to 0, so each zero adds one
+        unstable direction.)
     """
-    start(rod, field, load, u, columns, X, D)
-    cf = math.cos(u[3])
-    sf = math.sin(u[3])
+    begin(u, columns, X, D)
     zeros = 0
     positive = True
+    k = count - 1
+    reached = 0.0
     for i in range(rod.shape[0]):
-        enter_section(rod, i, load, cf, sf, columns, X, D)
+        add_load(rod, field, i, load, u, columns, X, D)
+        enter_section(rod, i, load, u, columns, X, D)
         n = substeps(rod[i, H], X, step)
         h = rod[i, H] / n
-        for _ in range(n):
+        for j in range(n):
+            x0 = X[2]
+            y0 = X[3]
             taylor_step(h, order, X, D, columns, T, C)
             if columns > 0 and (jacobi(D, columns) > 0.0) != positive:
                 positive = not positive
                 zeros += 1
-        if i + 1 < rod.shape[0]:
-            cross_joint(rod, field, i, load, u, cf, sf, columns, X, D)
+            if not abs(X[0]) < limit:
+                return -1
+            last = i + 1 == rod.shape[0] and j + 1 == n
+            k = sample(s, k, reached, h, last, order, x0, y0, u[3], X, T, out)
+            reached += h
     return zeros
 
 
-@njit(cache=True)
+@njit(**PART)
 def jacobi(D, columns):  # type: ignore[no-untyped-def]
     """Return the determinant of (theta, x, y) by (gamma, x_L, y_L)."""
     if columns == 1:

@@ -31,16 +31,17 @@ from ..core.units import MU0, rad_from_deg
 from .fields import Field, MagnetField, Solution, Support, UniformField
 from .planar import ORDER, STEP, solve3, solve_planar
 from .planar_march import (
+    PART,
     STATE,
     WX,
     WY,
     E,
     H,
     M,
-    cross_joint,
+    add_load,
+    begin,
     enter_section,
     field_at,
-    start,
     substeps,
     taylor_step,
 )
@@ -80,7 +81,7 @@ class Sensitivities:
     dtheta_rad: Array
 
 
-@njit(cache=True)
+@njit(**PART)
 def _field_change(field, change, x, y, b):  # type: ignore[no-untyped-def]
     """Return dB of one parameter at a fixed point (module docstring)."""
     fx = change[0] + change[2] * b[0] - b[2] * change[3] - b[3] * change[4]
@@ -93,7 +94,7 @@ def _field_change(field, change, x, y, b):  # type: ignore[no-untyped-def]
     return fx, fy
 
 
-@njit(cache=True)
+@njit(**PART)
 def _load_columns(field, m, dm, changes, x, y, cf, sf, D):  # type: ignore[no-untyped-def]
     """Add to all columns the change of the load m B(r) of the point (x, y)."""
     b = field_at(field, x, y)
@@ -110,7 +111,7 @@ def _load_columns(field, m, dm, changes, x, y, cf, sf, D):  # type: ignore[no-un
         D[5, a] += cf * fy - sf * fx
 
 
-@njit(cache=True)
+@njit(**PART)
 def _end_section(rod, rods, i, X, D):  # type: ignore[no-untyped-def]
     """Move the end of section `i`, for parameters that change its length."""
     sine = math.sin(X[0])
@@ -125,7 +126,7 @@ def _end_section(rod, rods, i, X, D):  # type: ignore[no-untyped-def]
         D[5, a] += dh * X[8]
 
 
-@njit(cache=True)
+@njit(**PART)
 def _station_columns(r, h, order, before, grow, T, C, out):  # type: ignore[no-untyped-def]
     """Evaluate the columns at the fraction `r` of a step of length `h`.
 
@@ -153,7 +154,7 @@ def _station_columns(r, h, order, before, grow, T, C, out):  # type: ignore[no-u
             out[2, a] -= grow[a - 3] * sine
 
 
-@njit(cache=True)
+@njit(**PART)
 def _combine(D, clamps, cf, sf, out):  # type: ignore[no-untyped-def]
     """Close the columns at the clamp: subtract what the unknowns must make up for.
 
@@ -174,7 +175,7 @@ def _combine(D, clamps, cf, sf, out):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _columns(rod, field, u, rods, changes, clamps, s, order, step):  # type: ignore[no-untyped-def]
     """Return theta, x, y by parameter at the stations, shape (n, 3, 3 + p), or fail.
 
@@ -189,18 +190,27 @@ def _columns(rod, field, u, rods, changes, clamps, s, order, step):  # type: ign
     grow = np.zeros(rods.shape[0])
     for i in range(rod.shape[0]):
         grow += rods[:, i, H]
-    start(rod, field, 1.0, u, 0, X, D)
-    cf = math.cos(u[3])
-    sf = math.sin(u[3])
-    D[0, 0] = 1.0
-    D[2, 1] = D[3, 2] = cf
-    D[3, 1] = -sf
-    D[2, 2] = sf
-    _load_columns(field, rod[0, M], rods[:, 0, M], changes, u[1], u[2], cf, sf, D)
+    begin(u, count, X, D)
+    dm = np.zeros(rods.shape[0])
     k = s.shape[0] - 1
     reached = 0.0
     for i in range(rod.shape[0]):
-        enter_section(rod, i, 1.0, cf, sf, 0, X, D)
+        m = rod[i, M]
+        dm[:] = rods[:, i, M]
+        if i > 0:
+            m -= rod[i - 1, M]
+            dm -= rods[:, i - 1, M]
+        add_load(rod, field, i, 1.0, u, 0, X, D)
+        cf = math.cos(u[3])
+        sf = math.sin(u[3])
+        if i == 0:
+            D[2, 1] = D[3, 2] = cf
+            D[3, 1] = -sf
+            D[2, 2] = sf
+        x = u[1] + cf * X[2] - sf * X[3]
+        y = u[2] + sf * X[2] + cf * X[3]
+        _load_columns(field, m, dm, changes, x, y, cf, sf, D)
+        enter_section(rod, i, 1.0, u, 0, X, D)
         D[6, 3:] = rods[:, i, E]
         D[7, 3:] = cf * rods[:, i, WX] + sf * rods[:, i, WY]
         D[8, 3:] = cf * rods[:, i, WY] - sf * rods[:, i, WX]
@@ -217,13 +227,6 @@ def _columns(rod, field, u, rods, changes, clamps, s, order, step):  # type: ign
             reached += h
         _end_section(rod, rods, i, X, D)
         grow -= rods[:, i, H]
-        if i + 1 < rod.shape[0]:
-            x = u[1] + cf * X[2] - sf * X[3]
-            y = u[2] + sf * X[2] + cf * X[3]
-            m = rod[i + 1, M] - rod[i, M]
-            dm = rods[:, i + 1, M] - rods[:, i, M]
-            _load_columns(field, m, dm, changes, x, y, cf, sf, D)
-            cross_joint(rod, field, i, 1.0, u, cf, sf, 0, X, D)
     return _combine(D, clamps, cf, sf, out), out
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ..core.centreline import Centreline
 from ..core.errors import InputError, SolverError
 from ..core.specimen import Specimen
@@ -15,7 +17,7 @@ from .fields import (
     Support,
     UniformField,
 )
-from .planar import GONE, ORDER, STEP, TOO_STRONG, TOUCHES, solve_planar
+from .planar import FAILED, GONE, ORDER, STEP, TOO_STRONG, TOUCHES, solve_planar
 from .scaling import field_array, rod_array, stations, stiffness_Nmm2
 
 STATUS = (STABLE, UNSTABLE, PULLED_IN)
@@ -100,12 +102,14 @@ def solve(
         raise failure(outcome, specimen, field, load)
     centreline = None
     if outcome != GONE:
-        centreline = Centreline(
-            s_mm=s * length_mm,
-            x_mm=table[0] * length_mm,
-            y_mm=table[1] * length_mm,
-            theta_rad=table[2],
-            kappa_per_mm=table[3] / length_mm,
+        if not math.isfinite(float(table.sum())):
+            raise failure(FAILED, specimen, field, load)
+        centreline = Centreline._trusted(
+            s * length_mm,
+            table[0] * length_mm,
+            table[1] * length_mm,
+            table[2],
+            table[3] / length_mm,
         )
     return Solution(
         centreline=centreline,
