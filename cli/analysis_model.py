@@ -30,7 +30,9 @@ def train(
         model_figures.check_path(figure)
     with progress("training") as tell:
         report = expansion_train.train(
-            seeds=seeds, steps=steps or expansion_train.STEPS, progress=tell
+            seeds=seeds,
+            steps=expansion_train.STEPS if steps is None else steps,
+            progress=tell,
         )
     published = expansion_train.PUBLISHED_MSE_PER_MM2
     if out is not None:

@@ -63,7 +63,10 @@ def main() -> None:
         sys.exit(1)
     except OSError as error:
         name = f"{error.filename}: " if error.filename else ""
-        _stop(error, f"{name}{error.strerror or error}")
+        reason = error.strerror or str(error)
+        if isinstance(error, FileExistsError):
+            reason = "is a file, not a folder; give another name"
+        _stop(error, f"{name}{reason}")
 
 
 def _stop(error: Exception, sentence: str) -> None:

@@ -143,3 +143,9 @@ def test_predict_command():
     assert answer["inside_domain"]
     far = runner.invoke(app, [*asked[:4], "--field-mT", "500"])
     assert "outside the trained range" in far.stderr
+
+
+def test_no_steps_are_not_the_default_number():
+    result = CliRunner().invoke(app, ["analysis", "train", "--steps", "0"])
+    assert isinstance(result.exception, InputError)
+    assert "steps must be from 1" in str(result.exception)

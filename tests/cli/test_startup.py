@@ -8,6 +8,8 @@ import sys
 
 import pytest
 
+from magbend.cli.main import main
+
 HEAVY = (
     "numpy",
     "scipy",
@@ -101,3 +103,18 @@ def test_wrong_usage_ends_with_2_and_no_traceback() -> None:
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
     assert "--no-such-option" in done.stderr
+
+
+def test_a_file_in_the_place_of_a_folder_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def make_a_folder() -> None:
+        raise FileExistsError(17, "File exists", "taken")
+
+    monkeypatch.setattr("magbend.cli.main.app", make_a_folder)
+    with pytest.raises(SystemExit) as stop:
+        main()
+    assert stop.value.code == 1
+    assert capsys.readouterr().err == (
+        "magbend: taken: is a file, not a folder; give another name\n"
+    )
