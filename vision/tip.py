@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from .centreline_fit import Curve
-from .edges import sample
+from .edges import _bilinear
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -74,9 +74,20 @@ def lanes(
         Light; NaN outside the picture.
     """
     points, theta = curve.at(s)
-    x = points[:, 0] - across[:, None] * np.sin(theta)
-    y = points[:, 1] + across[:, None] * np.cos(theta)
-    return sign * sample(grey, x, y)
+    light = np.empty((len(across), len(points)))
+    _sample_lanes(grey, points, theta, across, sign, light)
+    return light
+
+
+@njit(cache=True)
+def _sample_lanes(
+    grey: Image, points: Array, theta: Array, across: Array, sign: float, light: Array
+) -> None:
+    for k in range(len(points)):
+        u, v = -np.sin(theta[k]), np.cos(theta[k])
+        for i in range(across.size):
+            x, y = points[k, 0] + across[i] * u, points[k, 1] + across[i] * v
+            light[i, k] = sign * _bilinear(grey, x, y)
 
 
 def find_tip(
@@ -131,29 +142,42 @@ def find_tip(
 
 def line_through(across: Array, crossing: Array) -> EndFace | None:
     """Fit a line to lane crossings, the worst ones dropped."""
-    good = np.isfinite(crossing)
-    if good.sum() < 0.5 * len(crossing):
+    found = np.isfinite(crossing)
+    if np.count_nonzero(found) < 0.5 * len(crossing):
         return None
+    place, slope, scatter, used = _fit_line(across, crossing, found)
+    return EndFace(
+        s=place,
+        sigma=float(scatter / np.sqrt(used) + 0.005),
+        skew=slope,
+        scatter=scatter,
+        found=float(found.mean()),
+    )
+
+
+@njit(cache=True)
+def _fit_line(
+    across: Array, crossing: Array, found: NDArray[np.bool_]
+) -> tuple[float, float, float, int]:
+    """Return place, slope, scatter and number of crossings of the line's last fit."""
+    good = found
+    residual = np.empty(len(across))
+    place, slope, used = 0.0, 0.0, 0
     for _ in range(3):
         x, y = across[good], crossing[good]
+        used = len(x)
         centre, mean = x.mean(), y.mean()
-        slope = float((x - centre) @ y / ((x - centre) @ x))
-        place = float(mean - slope * centre)
+        slope = np.sum((x - centre) * y) / np.sum((x - centre) * x)
+        place = mean - slope * centre
         residual = crossing - place - slope * across
         distance = np.abs(residual)
-        spread = 1.4826 * float(np.sort(distance[good])[len(x) // 2]) + 0.02
+        spread = 1.4826 * np.sort(distance[good])[used // 2] + 0.02
         kept = distance < 3.5 * spread  # false where a lane does not cross
-        if kept.sum() < 4 or np.array_equal(kept, good):
+        if np.sum(kept) < 4 or np.all(kept == good):
             break
         good = kept
-    scatter = float(np.sqrt(np.mean(residual[good] ** 2)))
-    return EndFace(
-        s=float(place),
-        sigma=float(scatter / np.sqrt(good.sum()) + 0.005),
-        skew=float(slope),
-        scatter=scatter,
-        found=float(np.isfinite(crossing).mean()),
-    )
+    left = residual[good]
+    return place, slope, np.sqrt(np.mean(left**2)), len(left)
 
 
 def _rough_end(
