@@ -279,9 +279,9 @@ def _correct(columns, clamp, u, X, D, d):  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
-def _solve_row(
+def _solve_row(  # type: ignore[no-untyped-def]
     rod, field, clamp, margin, s, order, step, cold, u, found, out, X, D, T, C, d
-):  # type: ignore[no-untyped-def]
+):
     """Solve one rod into `found` and `out` (see `solve_rows`)."""
     bracket = np.empty(5)
     if cold:
