@@ -300,7 +300,11 @@ def probe(
 def _loaded(paths: Sequence[Path]) -> list[RunData]:
     from ..analysis.load import find_runs, load_run
 
-    return [load_run(path) for path in find_runs(paths)]
+    loaded = [load_run(path) for path in find_runs(paths)]
+    for run in loaded:
+        for warning in run.warnings:
+            typer.echo(f"{run.label}: {warning}", err=True)
+    return loaded
 
 
 def _compared(
@@ -391,9 +395,6 @@ def _print_comparison(table: pd.DataFrame, done: Sequence[RunComparison]) -> Non
         # A pipe has no width of its own: every row stays on one line.
         console = Console(width=240)
     console.print(view)
-    for run in done:
-        for warning in run.run.warnings:
-            typer.echo(f"{run.run.label}: {warning}", err=True)
 
 
 def _cell(value: Any, form: str | None) -> str:

@@ -116,6 +116,8 @@ def verify(
     else:
         for problem in problems:
             typer.echo(problem)
+        for warning in record.warnings if record else ():
+            typer.echo(f"{run}: {warning}", err=True)
         if record:
             typer.echo(f"{run}: good, {len(record.steps)} steps, {record.status}")
     if problems:

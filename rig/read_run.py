@@ -96,7 +96,7 @@ def read_run(path: Path) -> Run:
             f"{END_FILE} is missing: the run was cut off and can be resumed"
         )
     for warning in warnings:
-        logger.warning("%s: %s", path, warning)
+        logger.info("%s: %s", path, warning)
     return Run(
         path=path, manifest=manifest, steps=lines.steps, end=end,
         warnings=tuple(warnings),

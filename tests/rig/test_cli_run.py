@@ -58,6 +58,19 @@ def test_verify_fails_on_an_altered_picture(bench_folder: Path, tmp_path: Path) 
     assert "step_000.png: altered" in json.loads(result.stdout)["problems"][0]
 
 
+def test_verify_tells_once_that_a_run_was_cut_off(
+    bench_folder: Path, tmp_path: Path
+) -> None:
+    import shutil
+
+    copy = tmp_path / "copy"
+    shutil.copytree(bench_folder / "run", copy)
+    (copy / "end.json").unlink()
+    done = magbend("rig", "verify", str(copy), cwd=tmp_path)
+    assert done.returncode == 0
+    assert done.stderr.count("was cut off and can be resumed") == 1
+
+
 def test_a_run_is_not_overwritten(bench_folder: Path) -> None:
     done = magbend("rig", "run", "plan.toml", "--out", "run", cwd=bench_folder)
     assert done.returncode == 1
