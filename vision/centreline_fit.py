@@ -447,10 +447,10 @@ def _solve(
     if not last:
         fair = _FAIR * scale if strength is None else strength
         change = np.linalg.solve(normal + fair * full, right - fair * pull)
-        return _System(change, full, 0.0, shared)
+        return _System(np.asarray(change, dtype=np.float64), full, 0.0, shared)
     if strength is not None:
         stiff = normal + strength * full
-        root = np.linalg.inv(np.linalg.cholesky(stiff)).T
+        root = np.asarray(np.linalg.inv(np.linalg.cholesky(stiff)), np.float64).T
         change = root @ (root.T @ (right - strength * pull))
         return _System(change, root, float(np.sum(root * (normal @ root))), shared)
     inverse = np.linalg.inv(np.linalg.cholesky(normal))
