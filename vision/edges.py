@@ -118,22 +118,31 @@ def find_edges(
     Edges
         NaN where no edge was found.
     """
-    near = max(1.5, 2.2 * blur)
-    window = max(3.0, 2.0 * blur)
-    span = float(np.max(np.maximum(-low, high))) + reach + near + window + 1.0
+    near, clear = max(0.6, 1.1 * blur), max(1.5, 2.2 * blur)
+    window = max(4.0, 3.0 * blur)
+    span = float(np.max(np.maximum(-low, high))) + reach + clear + window + 1.0
     count = int(np.ceil(span / STEP_PX))
     strip = np.empty((len(points), 2 * count + 1), dtype=np.float32)
     _sample(grey, points, normals, STEP_PX, np.float32(sign), strip)
     out = np.full((2, 5, len(points)), np.nan)
+    wider = np.zeros((2, len(points)))
     for side, expected in enumerate((-low, high)):
         # Profiles from the axis outwards.
         half = strip[:, count::-1] if side == 0 else strip[:, count:]
         half = np.ascontiguousarray(half)
-        levels = np.empty((3, len(points)))
-        _levels(half, expected, near, window, blur, levels)
-        for row in levels:
-            row[:] = _running_mean(row, smooth)
-        _cross(half, expected, levels, reach, blur, out[side])
+        levels = np.empty((2, 3, len(points)))
+        for rows, gap in zip(levels, (near, clear), strict=True):
+            _levels(half, expected, gap, window, blur, rows)
+            for row in rows:
+                row[:] = _running_mean(row, smooth)
+        _cross(half, expected, levels[0], reach, blur, out[side])
+        out[side, 2:] = levels[1]
+        middle = 0.5 * (levels[:, 0] + levels[:, 1]) + levels[:, 2] * blur / _ROOT_2PI
+        wider[side] = (middle[1] - middle[0]) / out[side, 1]
+    # Levels close to the edges know the shade and so the middle; those clear of the
+    # blur, whose shape is not quite a Gaussian's, know the width.
+    growth = 0.5 * (wider[0] + wider[1])
+    out[:, 0] += np.where(np.abs(growth) < 0.5, growth, 0.0)
     inner = 0.5 * (out[0, 2] + out[1, 2])
     return Edges(
         low=-out[0, 0], high=out[1, 0], slope_low=out[0, 1], slope_high=out[1, 1],
@@ -260,41 +269,57 @@ def _sample(
 def _levels(
     half: Image, expected: Array, near: float, window: float, blur: float, levels: Array
 ) -> None:
-    """Inner level, outer level at the expected edge, and slope of the outer one."""
+    """Inner level, outer level at the expected edge, and slope of the outer one.
+
+    Least squares of a step onto a slope, both blurred by a Gaussian, on samples at
+    either side: so the blurred edge's own tails count neither as rod nor as shade.
+    """
     count, columns = half.shape
     step = 0.5
     for i in range(count):
         edge = expected[i]
-        total, number = 0.0, 0
-        first = max(int(np.ceil(max(edge - near - window, 0.0) / step)), 0)
-        last = min(int((edge - near) / step), columns - 1)
-        if last < first:
-            # Narrower than the blur: the darkest there is, at the axis.
-            first, last = 0, 1
-        for k in range(first, last + 1):
-            total += half[i, k]
-            number += 1
-        levels[0, i] = total / number
-        first = int(np.ceil((edge + near) / step))
+        first = int(np.ceil(max(edge - near - window, 0.0) / step))
         last = min(int((edge + near + window) / step), columns - 1)
-        n, st, sg, stt, stg = 0, 0.0, 0.0, 0.0, 0.0
+        n_out = 0
+        aa, ab, ac, bb, bc, cc = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        ga, gb, gc = 0.0, 0.0, 0.0
         for k in range(first, last + 1):
             t, g = k * step - edge, half[i, k]
-            # The blurred edge's own tail must not count as shade.
-            share = 0.5 * (1.0 + math.erf(t / (1.4142135623730951 * blur)))
-            g = (g - (1.0 - share) * levels[0, i]) / share
-            n += 1
-            st += t
-            sg += g
-            stt += t * t
-            stg += t * g
-        if n < 3:
+            if abs(t) < near:
+                continue
+            z = t / (1.4142135623730951 * blur)
+            b = 0.5 * (1.0 + math.erf(z))
+            a = 1.0 - b
+            c = t * b + 0.3989422804 * blur * math.exp(-z * z)
+            n_out += t > 0.0
+            aa += a * a
+            ab += a * b
+            ac += a * c
+            bb += b * b
+            bc += b * c
+            cc += c * c
+            ga += a * g
+            gb += b * g
+            gc += c * g
+        if aa < 0.5:
+            # Narrower than the blur: the darkest there is, at the axis.
+            dark = half[i, 0]
+            aa += 1.0
+            ga += dark
+        # Elimination of the three normal equations.
+        b1, b2, h1 = bb - ab * ab / aa, bc - ab * ac / aa, gb - ab * ga / aa
+        c2, h2 = cc - ac * ac / aa, gc - ac * ga / aa
+        det = b1 * c2 - b2 * b2
+        if n_out < 3 or not det > 1e-9:
+            levels[0, i] = ga / aa
             levels[1, i] = np.nan
             levels[2, i] = np.nan
             continue
-        slope = (n * stg - st * sg) / (n * stt - st * st)
+        outer = (h1 * c2 - h2 * b2) / det
+        slope = (h2 * b1 - h1 * b2) / det
+        levels[0, i] = (ga - ab * outer - ac * slope) / aa
+        levels[1, i] = outer
         levels[2, i] = slope
-        levels[1, i] = (sg - slope * st) / n
 
 
 @njit(cache=True)

@@ -88,6 +88,9 @@ class Measurement:
         width, in mm and degrees; NaN without a calibration.
     length_px, width_px : float
         Arc length and median width in the photograph, in pixels.
+    clamp_angle_sd_deg : float
+        Standard deviation of the direction at the clamp, which turns the whole
+        specimen frame and is in no point's `sigma_mm`; NaN without a calibration.
     clamp_px, tip_px : tuple of float
         Where the rod leaves the clamp, and the middle of its end face, in pixels.
     pose : Pose or None
@@ -102,6 +105,7 @@ class Measurement:
     tip_mm: tuple[float, float] = NAN2
     tip_angle_deg: float = math.nan
     width_mm: float = math.nan
+    clamp_angle_sd_deg: float = math.nan
     length_px: float = math.nan
     width_px: float = math.nan
     clamp_px: tuple[float, float] = NAN2

@@ -32,6 +32,15 @@ grey value than the top: `SIDE_FACE` of its width is in doubt."""
 SAMPLING_PX = 0.0025
 SHADE_LEFT = 0.22
 SIDE_FACE = 0.07
+THETA_PX = 0.003
+"""Systematic part of a tangent angle, times the width: pixel sampling, as above."""
+CLAMP_PX = 0.03
+"""The same for the direction at the clamp, where shade and JPEG move the edges: as it
+was met on photograph-like scenes."""
+UNKNOWN_CLAMP_MM = 5.0
+HIDDEN_MM = 0.05
+"""A clamp of unknown height may rise so far above the rod's axis; and what part of the
+root it may hide before that is named."""
 
 POINTS = 121
 """Points of a measured centreline."""
@@ -122,7 +131,9 @@ def _pixel_columns(
         "y_px": points[:, 1],
         "width_px": width,
         "sigma_px": np.interp(s, grid, np.hypot(SPREAD * fit.sigma, systematic)),
-        "sigma_theta_rad": SPREAD * np.interp(s, grid, fit.sigma_theta),
+        "sigma_theta_rad": np.hypot(
+            SPREAD * np.interp(s, grid, fit.sigma_theta), THETA_PX / width
+        ),
         "left_x_px": points[:, 0] - right[:, 0],
         "left_y_px": points[:, 1] - right[:, 1],
         "right_x_px": points[:, 0] + right[:, 0],
@@ -204,12 +215,19 @@ def _in_frame(
         tip_mm=(float(local[-1, 0]), float(local[-1, 1])),
         tip_angle_deg=float(np.degrees(heading[-1] - heading[0])),
         width_mm=float(np.median(table["width_mm"][table["good"] > 0.5])),
+        clamp_angle_sd_deg=_clamp_sd_deg(table),
         length_px=float(s[-1] - s[0]),
         width_px=float(np.median(refined.width[refined.good])),
         clamp_px=(float(points[0, 0]), float(points[0, 1])),
         tip_px=(float(points[-1, 0]), float(points[-1, 1])),
         pose=pose,
     )
+
+
+def _clamp_sd_deg(table: dict[str, Array]) -> float:
+    """Return the standard deviation of the direction at the clamp."""
+    own, width = table["sigma_theta_rad"][0], table["width_px"][0]
+    return float(np.degrees(np.hypot(own, CLAMP_PX / width)))
 
 
 def _root(refined: Refined, local: _Local, setting: Setting, side_mm: float) -> float:
@@ -250,12 +268,18 @@ def _hidden_root(refined: Refined, local: _Local, setting: Setting) -> float:
 
 
 def root_hidden(refined: Refined, setting: Setting) -> bool:
-    """Whether the clamp hides the root by more than a third of a pixel per mm."""
+    """Whether the clamp's top may hide more of the root than `HIDDEN_MM`.
+
+    Not where the height of the clamp or the length of the rod is known: then the root
+    is put where it belongs.
+    """
     camera = setting.calibration
     if camera is None or refined.clamp is None:
         return False
+    if setting.clamp_height_mm is not None or setting.length_mm is not None:
+        return False
     at = _local(camera, refined.fit.curve, 0, setting.rod_height_mm)
-    return at.rise_along > 1.0 / 3.0
+    return at.rise_along * UNKNOWN_CLAMP_MM > HIDDEN_MM * at.along
 
 
 def _local(camera: Calibration, curve: Curve, index: int, height: float) -> _Local:

@@ -25,6 +25,7 @@ FRAME_HEADER = (
     "image", "status", "flags", "length_mm", "tip_x_mm", "tip_y_mm", "tip_angle_deg",
     "width_mm", "clamp_x_px", "clamp_y_px", "tip_x_px", "tip_y_px", "clamp_x_mm",
     "clamp_y_mm", "clamp_angle_deg", "rod_height_mm", "reason",
+    "clamp_angle_sd_deg",
 )  # fmt: skip
 EDGE_HEADER = ("image", "side", "point", "x_px", "y_px", "x_mm", "y_mm")
 
@@ -67,6 +68,7 @@ def frame_row(image: str, measurement: Measurement) -> str:
         number(m.tip_mm[1]), number(m.tip_angle_deg), number(m.width_mm),
         number(m.clamp_px[0]), number(m.clamp_px[1]), number(m.tip_px[0]),
         number(m.tip_px[1]), *placed, " ".join(m.reason.split()),
+        number(m.clamp_angle_sd_deg),
     )  # fmt: skip
 
 
