@@ -42,6 +42,7 @@ $(VENV)/.ready: $(VENV)/.created pyproject.toml constraints.txt
 $(VENV)/.ready-test: $(VENV)/.created pyproject.toml constraints.txt
 	@echo "installing magbend, all extras and the test tools into $(VENV) (once, a few minutes)"
 	$(PIP) --constraint constraints.txt --editable '.[all,test]'
+	$(BIN)/python -m magbend.analysis.warm_up
 	touch $@ $(VENV)/.ready
 
 clean:
