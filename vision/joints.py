@@ -193,9 +193,9 @@ def _gains(model: _Model, joints: list[float], places: Array | None) -> Array:
         if extra is not None:
             cross, own, pull = extra
             seen = np.linalg.solve(lower, cross)
-            pairs = seen.reshape(size, -1, 2)
-            block = own - np.einsum("pma,pmb->mab", pairs, pairs)
-            force = pull - np.einsum("pma,p->ma", pairs, known)
+            part = seen.reshape(size, -1, 2)
+            block = own - np.einsum("pma,pmb->mab", part, part)
+            force = pull - np.einsum("pma,p->ma", part, known)
             det = block[:, 0, 0] * block[:, 1, 1] - block[:, 0, 1] ** 2
             gain = (
                 block[:, 1, 1] * force[:, 0] ** 2
