@@ -24,7 +24,7 @@ _MOST = 4
 _LEAST_GAIN = 4.0
 """Gain of twice the log evidence for a joint to be believed, beyond the choice among
 the places two widths apart where it might be."""
-_ENDS = 3.0
+_ENDS = 3.8
 """Widths next to either end where a jump could not be told from shade."""
 _APART = 3.0
 
