@@ -171,44 +171,46 @@ def _gains(model: _Model, joints: list[float], places: Array | None) -> Array:
     prior = _prior(model)
     tight = np.zeros(size)
     tight[smooth:] = prior
-    extra = None
+    # normal + tight and bend share eigenvectors V: V' (normal + tight) V = 1 and
+    # V' bend V = diag(stiff), so that every strength costs a sum and no solve.
+    held = normal + np.diag(tight) + 1e-13 * np.trace(normal) * np.eye(size)
+    unit = np.linalg.inv(np.linalg.cholesky(held))
+    stiff, turn = np.linalg.eigh(unit @ bend @ unit.T)
+    stiff, vectors = np.maximum(stiff, 0.0), unit.T @ turn
+    strengths = np.trace(normal) * 10.0 ** np.arange(-10.0, 2.0, 0.5)
+    loosen = 1.0 / (1.0 + strengths[:, None] * stiff)
+    turned = vectors.T @ right
+    left = (total - loosen @ turned**2)[:, None]
+    volume = (np.linalg.slogdet(held)[1] - np.log(loosen).sum(axis=1))[:, None]
+    joined = len(joints)
     if places is not None:
-        jumps = _jumps(model, places)
-        m = len(places)
-        cross = weighted.T @ jumps
-        pairs = jumps.reshape(len(model.s), m, 2)
-        scaled = pairs * (model.weight / model.shared)[:, None, None]
-        own = np.einsum("nma,nmb->mab", scaled, pairs) + prior * np.eye(2)
-        pull = np.einsum("nma,n->ma", scaled, model.offset)
-        extra = (cross, own, pull)
-    best = np.full(1 if places is None else len(places), -np.inf)
-    joined = len(joints) + (places is not None)
-    for strength in np.trace(normal) * 10.0 ** np.arange(-10.0, 2.0, 0.5):
-        matrix = normal + strength * bend + np.diag(tight)
-        matrix += 1e-13 * np.trace(normal) * np.eye(size)
-        lower = np.linalg.cholesky(matrix)
-        known = np.linalg.solve(lower, right)
-        left = np.full(len(best), total - float(known @ known))
-        volume = np.full(len(best), 2.0 * float(np.sum(np.log(np.diag(lower)))))
-        if extra is not None:
-            cross, own, pull = extra
-            seen = np.linalg.solve(lower, cross)
-            part = seen.reshape(size, -1, 2)
-            block = own - np.einsum("pma,pmb->mab", part, part)
-            force = pull - np.einsum("pma,p->ma", part, known)
-            det = block[:, 0, 0] * block[:, 1, 1] - block[:, 0, 1] ** 2
-            gain = (
-                block[:, 1, 1] * force[:, 0] ** 2
-                - 2.0 * block[:, 0, 1] * force[:, 0] * force[:, 1]
-                + block[:, 0, 0] * force[:, 1] ** 2
-            ) / det
-            left = left - gain
-            volume = volume + np.log(det)
-        left = np.maximum(left, 1e-12 * total + 1e-30)
-        score = -(model.count - 4.0) * np.log(left) - volume
-        score += _PIECES * np.log(strength) + 2.0 * joined * np.log(prior)
-        best = np.maximum(best, score)
-    return best
+        joined += 1
+        gain, det = _joined(model, places, weighted, vectors, turned, loosen, prior)
+        left, volume = left - gain, volume + np.log(det)
+    left = np.maximum(left, 1e-12 * total + 1e-30)
+    score = -(model.count - 4.0) * np.log(left) - volume
+    score += _PIECES * np.log(strengths)[:, None] + 2.0 * joined * np.log(prior)
+    return np.asarray(score.max(axis=0))
+
+
+def _joined(
+    model: _Model, places: Array, weighted: Array, vectors: Array, turned: Array,
+    loosen: Array, prior: float,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return fall of the misfit and determinant, (strengths, m), of a joint each."""
+    jumps = _jumps(model, places)
+    first, second = jumps[:, 0::2], jumps[:, 1::2]
+    share = (model.weight / model.shared)[:, None]
+    cross = vectors.T @ (weighted.T @ jumps)
+    c, d = cross[:, 0::2], cross[:, 1::2]
+    offset = model.offset[:, None]
+    aa = (share * first**2).sum(axis=0) + prior - loosen @ c**2
+    bb = (share * second**2).sum(axis=0) + prior - loosen @ d**2
+    ab = (share * first * second).sum(axis=0) - loosen @ (c * d)
+    fa = (share * first * offset).sum(axis=0) - loosen @ (c * turned[:, None])
+    fb = (share * second * offset).sum(axis=0) - loosen @ (d * turned[:, None])
+    det = aa * bb - ab**2
+    return (bb * fa**2 - 2.0 * ab * fa * fb + aa * fb**2) / det, det
 
 
 def _prior(model: _Model) -> float:
