@@ -90,7 +90,9 @@ def sweep(
         return
     for row in rows:
         tip = row["tip_mm"]
-        where = "tip ({:8.4f}, {:8.4f}) mm".format(*tip) if tip else ""
+        where = ""
+        if isinstance(tip, tuple):
+            where = f"tip ({tip[0]:8.4f}, {tip[1]:8.4f}) mm"
         typer.echo(
             f"{row['study']:10s} {row['value']:>10s} {row['unit']:8s} {where}  "
             f"{row['status']}"
