@@ -95,6 +95,7 @@ def test_a_hundred_kills_lose_nothing(plan_file: Path, tmp_path: Path) -> None:
 
 
 @posix_only
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("phase", "line", "delay_s", "number"),
     [
