@@ -7,6 +7,8 @@ import re
 from collections.abc import Generator
 from typing import TYPE_CHECKING
 
+from .board_orders import run_order
+from .board_realtime import realtime
 from .gcode import GcodeError, read_line
 from .motion import Block
 
@@ -37,7 +39,9 @@ def system_line(board: GrblBoard, line: str) -> Task:
             raise GcodeError(8)
         if not body.startswith("J="):
             raise GcodeError(3)
-        yield from board.run_order(read_line(body[2:], board.modal, jog=True), jog=True)
+        yield from run_order(
+            board, read_line(body[2:], board.modal, jog=True), jog=True
+        )
     elif body[0] in "$GCX":
         if len(body) > 1:
             raise GcodeError(3)
@@ -140,7 +144,7 @@ def home(board: GrblBoard) -> Task:
         if board.aborted:
             board.homing = False
             return
-    yield from board.realtime()
+    yield from realtime(board)
     board.homing = False
     if board.aborted:
         return
@@ -163,7 +167,7 @@ def _home_axes(board: GrblBoard, axes: tuple[int, ...]) -> Task:
         found = yield from _home_phase(board, axes, travel, rate, approach)
         if not found:
             board.reset_from_anywhere()
-            yield from board.realtime()
+            yield from realtime(board)
             return
         board.mover.kill()
         board.flags.discard("cycle stop")

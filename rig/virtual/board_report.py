@@ -65,7 +65,7 @@ def _extras(board: GrblBoard, busy: bool, offset: list[float]) -> list[str]:
 
 def _state(board: GrblBoard) -> str:
     if board.state == "Hold":
-        return "Hold:0" if board.standing else "Hold:1"
+        return "Hold:0" if board.held else "Hold:1"
     return board.state
 
 
