@@ -117,6 +117,7 @@ class GrblSession:
         """
         self.drain()
         limit_s = self._answer_timeout_s if timeout_s is None else timeout_s
+        self.in_step = False  # until the reply is here
         self._link.write(line.encode("ascii") + b"\n")
         end_s = self._clock.monotonic_s() + _PATIENCE * limit_s
         restarts, lines = self.restarts, list[Line]()
@@ -124,13 +125,14 @@ class GrblSession:
             # A board that still talks is not late: each line gives it time anew.
             answer = self.pump(min(limit_s, end_s - self._clock.monotonic_s()))
             if answer is None:
-                self.in_step = False
                 raise StageTimeoutError(
                     f"the stage did not answer {line!r} within {limit_s:.0f} s"
                 )
             if isinstance(answer, Ok):
+                self.in_step = True
                 return lines
             if isinstance(answer, Refusal):
+                self.in_step = True
                 raise CommandRefusedError(line, answer.code)
             if isinstance(answer, Alarm):
                 raise self.alarm_error(answer.code)

@@ -1,11 +1,15 @@
 """The conversation with a Marlin board: one line, one ``ok``, keep-alives between.
 
-Read in MarlinFirmware's own sources, not run on hardware: ``ok`` ends every line,
-``echo:busy: processing`` says that a long one still runs, ``start`` is a restart.
+Read in MarlinFirmware's own sources, not run on hardware: ``ok`` ends every line, even
+one that is refused; ``echo:busy: processing``: a long one still runs; ``start``: the
+board restarted. Replies carry no number: after one that did not come, a line with a
+text of its own (``M118``, echoed even by a board that does not know it) says where they
+stand.
 """
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,6 +20,7 @@ from .link import Link
 from .stage import PositionLostError, StageTimeoutError
 
 _SLICE_S = 0.1
+_PATIENCE = 10.0
 _NUMBER = r"(-?\d+(?:\.\d+)?)"
 
 
@@ -30,14 +35,25 @@ class MarlinSession:
     ----------
     restarts : int
         How often the board said ``start``.
+    halted : bool
+        Whether it stopped itself (``kill()``); only a restart helps.
+    place_mm : float or None
+        The last reported place of the stage's axis, in mm.
     """
 
     def __init__(self, link: Link, clock: Clock, *, answer_timeout_s: float) -> None:
         self._link = link
         self._clock = clock
         self._answer_timeout_s = answer_timeout_s
+        self._in_step = True
+        self._marks = itertools.count(1)
         self.restarts = 0
         self.halted = False
+        self.place_mm: float | None = None
+
+    def machine(self) -> tuple[float, ...] | None:
+        """Return the last reported place of the axis, in mm."""
+        return None if self.place_mm is None else (self.place_mm,)
 
     def drain(self) -> None:
         """Read what is already here."""
@@ -61,6 +77,12 @@ class MarlinSession:
     ) -> list[str]:
         """Send one line and return what came before its ``ok``.
 
+        Parameters
+        ----------
+        timeout_s : float, optional
+            How long a motion may take. Without it the line is a question, and a board
+            that says ``busy`` is given time anew.
+
         Raises
         ------
         PositionLostError
@@ -68,14 +90,46 @@ class MarlinSession:
         StageError
             It refused the line.
         StageTimeoutError
-            It did not answer and sent no keep-alive either.
+            It did not answer.
         """
-        self.drain()
         limit_s = self._answer_timeout_s if timeout_s is None else timeout_s
+        patience = _PATIENCE if timeout_s is None else 1.0
+        if not self._in_step:
+            mark = f"magbend {next(self._marks)}"
+            self._exchange(f"M118 {mark}", limit_s, patience, check, mark)
+        self.drain()
+        lines = self._exchange(line, limit_s, patience, check)
+        refused = [t for t in lines if t.startswith("Error:") or "Unknown command" in t]
+        if refused:
+            raise StageError(f"the stage refused {line!r}: {refused[0]}")
+        return lines
+
+    def interrupt(self, line: str) -> None:
+        """Send a line while another runs, and wait for nothing."""
+        self._in_step = False
+        self._link.write_realtime(line.encode("ascii") + b"\n")
+
+    def ask_place(self, axis: str, step_mm: float) -> float | None:
+        """Ask where the axis is (``M114``), in mm."""
+        self.place_mm = None
+        self.place_mm = read_position(self.command("M114"), axis, 1.0 / step_mm)
+        return self.place_mm
+
+    def _exchange(
+        self,
+        line: str,
+        limit_s: float,
+        patience: float,
+        check: Callable[[], None],
+        mark: str = "",
+    ) -> list[str]:
+        """Send a line; return what came before its ``ok``, known by `mark`."""
         restarts, lines = self.restarts, list[str]()
+        self._in_step = False  # until the reply is here
         self._link.write(line.encode("ascii") + b"\n")
-        deadline_s = self._clock.monotonic_s() + limit_s
-        while self._clock.monotonic_s() < deadline_s:
+        late_s = self._clock.monotonic_s() + limit_s
+        end_s = late_s + (patience - 1.0) * limit_s
+        while self._clock.monotonic_s() < late_s:
             answer = self._link.read_line(_SLICE_S)
             if answer is None:
                 check()
@@ -86,11 +140,13 @@ class MarlinSession:
                     f"the board restarted or was halted ({answer}); home it "
                     "(magbend rig home)"
                 )
-            if answer == "ok" or answer.startswith("ok "):
+            if "busy: processing" in answer:
+                late_s = min(max(late_s, self._clock.monotonic_s() + limit_s), end_s)
+            elif not (answer == "ok" or answer.startswith("ok ")):
+                lines.append(answer)
+            elif mark in " ".join(lines):
+                self._in_step = True
                 return lines
-            if answer.startswith("Error:") or "Unknown command" in answer:
-                raise StageError(f"the stage refused {line!r}: {answer}")
-            lines.append(answer)
         raise StageTimeoutError(
             f"the stage did not finish {line!r} within {limit_s:.0f} s"
         )

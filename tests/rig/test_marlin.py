@@ -76,6 +76,8 @@ class MarlinBoard:
             distance = float(match[1]) - self.x_mm
             self._free_s = now + abs(distance) / (float(match[2]) / 60.0)
             self.x_mm += distance * (0.5 if self.short else 1.0)
+        elif line.startswith("M118"):
+            self.say(line[5:], now)
         elif line == "M400":
             now = max(now, self._free_s)
         elif line == "M114":

@@ -1,19 +1,32 @@
-"""How far the position of a GRBL board can be trusted, and what shakes that trust."""
+"""How far the count of a board can be trusted, and what shakes that trust."""
 
 from __future__ import annotations
 
-from .grbl_protocol import Triple, alarm_text
-from .grbl_session import GrblSession
+from typing import Protocol
+
 from .stage import PositionLostError, PositionState
+
+Place = tuple[float, ...]
+
+
+class Counting(Protocol):
+    """A conversation with a board that counts where it is.
+
+    Attributes
+    ----------
+    restarts : int
+        How often the board restarted without being asked to.
+    """
+
+    restarts: int
+
+    def machine(self) -> Place | None:
+        """Return the last reported machine position of the axes, in mm."""
+        ...
 
 
 class PositionTrust:
     """Trust in the count of one board.
-
-    Parameters
-    ----------
-    axis : str
-        ``X``, ``Y`` or ``Z``.
 
     Attributes
     ----------
@@ -21,25 +34,24 @@ class PositionTrust:
         How far the position can be trusted.
     """
 
-    def __init__(self, axis: str) -> None:
-        self._axis = axis
-        self._stood_at: Triple | None = None
+    def __init__(self) -> None:
+        self._stood_at: Place | None = None
         self._restarts = 0
         self.state: PositionState = "unknown"
 
-    def watch(self, session: GrblSession) -> None:
+    def watch(self, session: Counting) -> None:
         """Begin with a fresh session, of which nothing is known."""
         self.lose()
         self._restarts = session.restarts
         self._stood_at = session.machine()
 
-    def confirm(self, session: GrblSession) -> None:
+    def confirm(self, session: Counting) -> None:
         """Say that the position is right, here and now."""
         self.state = "homed"
         self._restarts = session.restarts
         self._stood_at = session.machine()
 
-    def stands(self, session: GrblSession) -> None:
+    def stands(self, session: Counting) -> None:
         """Note where the stage stands after a move or a hold."""
         self._stood_at = session.machine()
 
@@ -52,15 +64,13 @@ class PositionTrust:
         """Say that the position is lost."""
         self.state, self._stood_at = "unknown", None
 
-    def note(self, session: GrblSession) -> None:
-        """Take in what the board has said: restarts and alarms."""
+    def note(self, session: Counting) -> None:
+        """Take in whether the board restarted."""
         if session.restarts != self._restarts:
             self._restarts = session.restarts
             self.lose()
-        if session.alarm is not None and not alarm_text(session.alarm).position_kept:
-            self.state = "unknown"
 
-    def is_at(self, session: GrblSession, place: Triple, step_mm: float) -> bool:
+    def is_at(self, session: Counting, place: Place, step_mm: float) -> bool:
         """Return whether the board counts this place on all axes."""
         now = session.machine()
         if now is None or len(now) != len(place):
@@ -68,24 +78,14 @@ class PositionTrust:
         slack = 1.5 * step_mm
         return all(abs(a - b) <= slack for a, b in zip(now, place, strict=True))
 
-    def require(self, session: GrblSession, step_mm: float) -> None:
-        """Refuse motion unless the board is where it was left, homed and free.
+    def require(self, session: Counting, step_mm: float) -> None:
+        """Refuse motion unless the board is homed and where it was left.
 
         Raises
         ------
-        AlarmError
-            If an alarm locks it.
         PositionLostError
-            If the position is not known, the board moved or restarted unseen, or the
-            limit switch of the axis is closed.
+            If the position is not known, or the board moved or restarted unseen.
         """
-        report = session.report
-        if report and report.state == "alarm":
-            if session.alarm is not None:
-                raise session.alarm_error(session.alarm)
-            raise PositionLostError(
-                "the board is locked (Alarm); home it (magbend rig home)"
-            )
         stood = self._stood_at
         if self.state == "homed" and stood and not self.is_at(session, stood, step_mm):
             self.lose()
@@ -98,9 +98,4 @@ class PositionTrust:
             raise PositionLostError(
                 f"the position of the stage is {self.state}; home it first "
                 "(magbend rig home), then move"
-            )
-        if report and self._axis in report.pins:
-            raise PositionLostError(
-                f"the limit switch of {self._axis} is closed (Pn:{report.pins}); free "
-                "it and home the stage"
             )
