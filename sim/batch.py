@@ -279,7 +279,7 @@ def _solve_hard(
 ) -> tuple[Array, Array, Array, Array]:
     """Solve the designs that left the lanes: tips, outcomes, errors, indices."""
     stations = np.linspace(0.0, 1.0, 41)[None]
-    found, _, curves, _ = solve_planar_rows(
+    found, curves, _ = solve_planar_rows(
         rods, fields, 0.0, margins, stations, _ORDER, _STEP
     )
     tips = curves[:, :3, -1]

@@ -259,7 +259,7 @@ def _solve(
     status: NDArray[np.int8],
     error: Array,
 ) -> None:
-    found, _, curves, _ = solve_planar_rows(
+    found, curves, _ = solve_planar_rows(
         rods, fields, 0.0, margins, stations, ORDER, STEP
     )
     outcome = found[:, 0].astype(np.int64)

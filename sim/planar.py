@@ -32,8 +32,9 @@ Array = NDArray[np.float64]
 OK_STABLE, OK_UNSTABLE, GONE, FAILED, TOO_STRONG, TOUCHES, FOLLOW = range(7)
 """Outcomes: stable, unstable, no equilibrium, no convergence, load beyond `MAX_REACH`,
 undeformed rod touches the magnet; and, inside this module, load to be followed."""
-ITERATE, COMPARE, SHAPE = 0, 1, 2
-"""What a march of `_solve_row` is for."""
+COARSE, FINE, SHAPE = 0, 1, 2
+"""What a march of `_solve_row` is for: to come near, to arrive, and to compare with a
+higher order while the shape is filled."""
 
 MAX_REACH = 200.0
 """Largest sum of h sqrt(e P), the length of the rod in units of its boundary layer."""
@@ -46,8 +47,17 @@ STEP = 0.3
 ROUNDING = 2e-14
 """What rounding alone may leave, in lengths of the rod."""
 
+COARSE_ORDER = 8
+COARSE_STEP = 0.6
+"""What brings an iteration within about 1e-7 of its end, at a quarter of the cost."""
+
 SHRINK = 0.25
-SMALL = 1e-8
+SMALL = 1e-7
+"""Correction after which the next would be of the size of rounding."""
+NEAR = 1e-3
+"""Correction after which a coarse iteration has done its part."""
+ENOUGH = 1e-13
+"""Difference between the orders that is left uncorrected, in lengths of the rod."""
 MIN_LOAD_STEP = 1e-7
 
 
@@ -100,10 +110,17 @@ def straight(clamp, u):  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
-def _touches(field, margin, curve):  # type: ignore[no-untyped-def]
-    """Tell whether any point of a curve is within `margin` of the magnet."""
+def _in_reach(field, margin):  # type: ignore[no-untyped-def]
+    """Tell whether a rod clamped at the origin is long enough to touch the magnet."""
     if field[0] == 0.0:
         return False
+    corner = math.sqrt(field[1] ** 2 + field[2] ** 2 + field[3] ** 2)
+    return math.hypot(field[4], field[5]) <= 1.0 + margin + corner
+
+
+@njit(**PART)
+def _touches(field, margin, curve):  # type: ignore[no-untyped-def]
+    """Tell whether any point of a curve is within `margin` of the magnet."""
     found = False
     for k in range(curve.shape[1]):
         found = found or inside(field[1:], curve[0, k], curve[1, k], 0.0, margin)
@@ -213,6 +230,20 @@ def _reach(rod, flux):  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
+def _growth(rod, flux):  # type: ignore[no-untyped-def]
+    """Return by what factor a small angle from the load grows from tip to clamp."""
+    g = 1.0
+    r = 0.0
+    for i in range(rod.shape[0]):
+        p = abs(rod[i, M]) * flux
+        w = math.sqrt(rod[i, E] * p)
+        c = math.cosh(rod[i, H] * w)
+        s = rod[i, H] if w == 0.0 else math.sinh(rod[i, H] * w) / w
+        g, r = g * c + r * rod[i, E] * s, r * c + g * p * s
+    return g
+
+
+@njit(**PART)
 def _first_guess(rod, field, clamp, u, bracket):  # type: ignore[no-untyped-def]
     """Set u and the bracket (low, high, guess, goal, side) of a one-sided rod.
 
@@ -226,7 +257,7 @@ def _first_guess(rod, field, clamp, u, bracket):  # type: ignore[no-untyped-def]
     u[3] = clamp - target
     side = -1.0 if target < 0.0 else 1.0
     goal = math.tan(0.25 * abs(target))
-    guess = goal / math.cosh(_reach(rod, math.hypot(field[1], field[2])))
+    guess = goal / _growth(rod, math.hypot(field[1], field[2]))
     bracket[0] = 0.0
     bracket[1] = goal
     bracket[2] = guess
@@ -240,7 +271,7 @@ def _first_guess(rod, field, clamp, u, bracket):  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
-def _narrow(passed, X, D, u, bracket):  # type: ignore[no-untyped-def]
+def _narrow(passed, enough, X, D, u, bracket):  # type: ignore[no-untyped-def]
     """Improve the bracketed guess by what a march found; return whether it is done."""
     low, high, t, goal, side = (
         bracket[0], bracket[1], bracket[2], bracket[3], bracket[4],
@@ -255,7 +286,7 @@ def _narrow(passed, X, D, u, bracket):  # type: ignore[no-untyped-def]
         else:
             low = t
         new = t - (g - goal) * (1.0 + t * t) / (D[0, 0] * (1.0 + g * g))
-    done = not passed and abs(new - t) <= SMALL * t
+    done = not passed and abs(new - t) <= enough * t
     if not done and not low < new < high:
         new = math.sqrt(low * high) if low > 0.0 else 0.1 * high
     bracket[0] = low
@@ -284,34 +315,35 @@ def _solve_row(  # type: ignore[no-untyped-def]
 ):
     """Solve one rod into `found` and `out` (see `solve_rows`)."""
     bracket = np.empty(5)
+    reach = _in_reach(field, margin)
     if cold:
         u[3] = 0.0
         straight(clamp, u)
-        for k in range(s.shape[0]):
-            out[0, k] = s[k] * math.cos(clamp)
-            out[1, k] = s[k] * math.sin(clamp)
+        if reach:
+            for k in range(s.shape[0]):
+                out[0, k] = s[k] * u[1]
+                out[1, k] = s[k] * u[2]
+            if _touches(field, margin, out):
+                found[0] = TOUCHES
+                return
     simple = one_sided(rod, field)
-    limit = math.inf
-    if simple:
-        limit = _first_guess(rod, field, clamp, u, bracket)
+    limit = _first_guess(rod, field, clamp, u, bracket) if simple else math.inf
     columns = 1 if simple else 4
-    stage = ITERATE
-    index = 0
+    stage = COARSE if cold and order > COARSE_ORDER else FINE
+    first = 1.0 if cold else 0.1
     before = math.inf
-    error = 0.0
-    if cold and _touches(field, margin, out):
-        found[0] = TOUCHES
-        return
-    found[0] = FAILED
+    error = -1.0
+    index = 0
     for k in range(220):
-        free = simple or stage != ITERATE or field[0] == 0.0
+        free = field[0] == 0.0 or stage == SHAPE
         if not free and inside(field[1:], u[1], u[2], 0.0, 0.0):
             break
         zeros = march(
             rod, field, 1.0, u,
-            order if stage == ITERATE else order + 4, step,
-            columns if stage == ITERATE else 0,
-            limit if stage == ITERATE else math.inf,
+            COARSE_ORDER if stage == COARSE else order if stage == FINE else order + 4,
+            COARSE_STEP if stage == COARSE else step,
+            0 if stage == SHAPE else columns,
+            math.inf if stage == SHAPE else limit,
             s, s.shape[0] if stage == SHAPE else 0, X, D, T, C, out,
         )  # fmt: skip
         if k == 0 and cold:
@@ -321,56 +353,70 @@ def _solve_row(  # type: ignore[no-untyped-def]
             if not _reach(rod, math.hypot(X[9], X[10])) < most:
                 found[0] = TOO_STRONG
                 return
-        if stage == SHAPE:
-            break
-        if stage == ITERATE and simple:
-            if limit > 4.0:
-                index = zeros
-                stage = COMPARE
-            elif _narrow(zeros < 0, X, D, u, bracket):
-                stage = COMPARE
-            continue
-        size = _correct(columns, clamp, u, X, D, d)
-        change = max(abs(d[0]), abs(d[1]), abs(d[2]))
-        if stage == COMPARE:
-            error = size + abs(d[0]) + abs(d[1]) + abs(d[2])
-            stage = SHAPE
-        elif change < SMALL and size < math.inf:
+        if simple and stage != SHAPE:
+            enough = NEAR if stage == COARSE else SMALL
+            done = limit > 4.0 or _narrow(zeros < 0, enough, X, D, u, bracket)
+            if done and stage == COARSE:
+                bracket[0] = 0.0
+                bracket[1] = bracket[3]
+        else:
+            size = _correct(columns, clamp, u, X, D, d)
+            change = max(abs(d[0]), abs(d[1]), abs(d[2]))
+            if stage == SHAPE:
+                done = error >= 0.0
+                if not done:
+                    error = size + abs(d[0]) + abs(d[1]) + abs(d[2])
+                    done = error < ENOUGH
+                if done:
+                    break
+            else:
+                done = change < (NEAR if stage == COARSE else SMALL)
+                if not size < math.inf or not (
+                    done or (change < first and change <= SHRINK * before and k < 20)
+                ):
+                    break
+                before = change
+            for a in range(3):
+                u[a] += d[a]
+        if done:
+            stage += 1
             index = zeros
-            stage = COMPARE
-        elif not change < (1.0 if cold else 0.1) or change > SHRINK * before or k > 14:
-            break
-        before = change
-        for a in range(3):
-            u[a] += d[a]
+            before = math.inf
     if stage != SHAPE or (cold and index != 0 and not simple):
-        if not simple and cold:
-            found[0] = FOLLOW
+        found[0] = FOLLOW if cold and not simple else FAILED
         return
-    _place(u, X, out)
     found[0] = OK_STABLE if index == 0 else OK_UNSTABLE
-    if _touches(field, margin, out):
+    if not _place(u, X, out):
+        found[0] = FAILED
+    elif reach and _touches(field, margin, out):
         found[0] = GONE
     found[1] = index
     found[2] = error + ROUNDING
     found[3] = X[9]
     found[4] = X[10]
     found[5] = -X[1]
+    found[6] = 1.0
 
 
 @njit(**PART)
 def _place(u, X, out):  # type: ignore[no-untyped-def]
-    """Turn the curve, which counts from the tip, so that it counts from the clamp."""
+    """Turn the curve, which counts from the tip, so that it counts from the clamp.
+
+    Return whether it is finite.
+    """
     cf = math.cos(u[3])
     sf = math.sin(u[3])
     n = out.shape[1]
+    total = 0.0
     for k in range(n):
         x = out[0, k] - X[2]
         y = out[1, k] - X[3]
         out[0, k] = cf * x - sf * y
         out[1, k] = sf * x + cf * y
+        total += out[0, k] + out[1, k] + out[2, k] + out[3, k]
     u[1] = out[0, n - 1]
     u[2] = out[1, n - 1]
+    return math.isfinite(total)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -393,8 +439,9 @@ def solve_rows(rods, fields, clamp, margins, s, order, step, cold, u, found, out
         Whether to start from the straight rod rather than from `u`.
     u : ndarray, shape (n, 4)
         Receives the unknowns (gamma, x_L, y_L, phi) of the march.
-    found : ndarray, shape (n, 6)
-        Receives outcome, Morse index, error, Bx and By at the tip, root moment.
+    found : ndarray, shape (n, 7)
+        Receives outcome, Morse index (-1: none), error, Bx and By at the tip, root
+        moment, and the load reached (0 where it is still to be followed).
     out : ndarray, shape (n, 4, m)
         Receives x, y, theta, curvature.
     """
@@ -403,6 +450,8 @@ def solve_rows(rods, fields, clamp, margins, s, order, step, cold, u, found, out
     T = np.empty((4, MAX_ORDER + 1))
     C = np.empty((MAX_ORDER + 1, 4, 4))
     d = np.empty(3)
+    found[:, 1] = -1.0
+    found[:, 6] = 0.0
     for i in range(rods.shape[0]):
         _solve_row(
             rods[i], fields[i], clamp, margins[i], s[min(i, s.shape[0] - 1)], order,
@@ -418,41 +467,53 @@ def solve_planar_rows(
     s: Array,
     order: int,
     step: float,
-) -> tuple[Array, Array, Array, Array]:
+) -> tuple[Array, Array, Array]:
     """Solve many rods (arguments as of `solve_rows`).
 
     Returns
     -------
-    found : ndarray, shape (n, 6)
-        Outcome, Morse index (-1: none), error, Bx and By at the tip, root moment.
-    load : ndarray, shape (n,)
-        Load reached: 1 but where the outcome is no equilibrium.
+    found : ndarray, shape (n, 7)
+        Outcome, Morse index (-1: none), error, Bx and By at the tip, root moment, load
+        reached: 1 but where the outcome is no equilibrium.
     out : ndarray, shape (n, 4, m)
         x, y, theta, curvature.
     u : ndarray, shape (n, 4)
         The unknowns of the march.
     """
     n = len(rods)
-    found = np.zeros((n, 6))
+    found = np.empty((n, 7))
     out = np.empty((n, 4, s.shape[1]))
     u = np.empty((n, 4))
-    load = np.ones(n)
     solve_rows(rods, fields, clamp, margins, s, order, step, True, u, found, out)
-    if (found[:, 0] > OK_UNSTABLE).any():
-        load[found[:, 0] > OK_UNSTABLE] = 0.0
-        found[found[:, 0] > OK_UNSTABLE, 1] = -1.0
-        for i in np.flatnonzero(found[:, 0] == FOLLOW):
-            index, load[i] = follow_load(rods[i], fields[i], clamp, u[i], order, step)
-            if index < 0:
-                found[i, 0] = GONE if index == -1 else FAILED
-                continue
-            k = slice(i, i + 1)
-            here = s if len(s) == 1 else s[k]
-            solve_rows(
-                rods[k], fields[k], clamp, margins[k], here, order, step, False,
-                u[k], found[k], out[k],
-            )  # fmt: skip
-    return found, load, out, u
+    for i in np.flatnonzero(found[:, 0] == FOLLOW):
+        k = slice(i, i + 1)
+        here = s if len(s) == 1 else s[k]
+        _solve_by_following(
+            rods[k], fields[k], clamp, margins[k], here, order, step,
+            u[k], found[k], out[k],
+        )  # fmt: skip
+    return found, out, u
+
+
+def _solve_by_following(
+    rods: Array,
+    fields: Array,
+    clamp: float,
+    margins: Array,
+    s: Array,
+    order: int,
+    step: float,
+    u: Array,
+    found: Array,
+    out: Array,
+) -> None:
+    """Solve the one rod of these arrays (as of `solve_rows`) by load continuation."""
+    index, load = follow_load(rods[0], fields[0], clamp, u[0], order, step)
+    if index >= 0:
+        solve_rows(rods, fields, clamp, margins, s, order, step, False, u, found, out)
+    else:
+        found[0, 0] = GONE if index == -1 else FAILED
+        found[0, 6] = load
 
 
 def solve_planar(
@@ -473,10 +534,13 @@ def solve_planar(
         the shape (4, n): x, y, theta, curvature, and the unknowns (gamma, x_L, y_L,
         phi) of the march.
     """
-    found, load, out, u = solve_planar_rows(
-        rod[None], field[None], clamp, np.array([margin]), s[None], order, step
-    )
-    outcome, index, error, bx, by, moment = found[0].tolist()
-    return (
-        int(outcome), int(index), float(load[0]), error, bx, by, moment, out[0], u[0],
-    )  # fmt: skip
+    # Not by way of `solve_planar_rows`, which costs a few microseconds more.
+    case = rod[None], field[None], clamp, np.array([margin]), s[None], order, step
+    found = np.empty((1, 7))
+    out = np.empty((1, 4, len(s)))
+    u = np.empty((1, 4))
+    solve_rows(*case, True, u, found, out)
+    if found[0, 0] == FOLLOW:
+        _solve_by_following(*case, u, found, out)
+    outcome, index, error, bx, by, moment, load = found[0].tolist()
+    return int(outcome), int(index), load, error, bx, by, moment, out[0], u[0]

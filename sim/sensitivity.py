@@ -39,11 +39,13 @@ from .planar_march import (
     H,
     M,
     add_load,
+    advance,
     begin,
+    column_step,
     enter_section,
     field_at,
+    series,
     substeps,
-    taylor_step,
 )
 from .scaling import (
     checked_density,
@@ -98,60 +100,73 @@ def _field_change(field, change, x, y, b):  # type: ignore[no-untyped-def]
 def _load_columns(field, m, dm, changes, x, y, cf, sf, D):  # type: ignore[no-untyped-def]
     """Add to all columns the change of the load m B(r) of the point (x, y)."""
     b = field_at(field, x, y)
-    for a in range(D.shape[1]):
-        dx = cf * D[2, a] - sf * D[3, a]
-        dy = sf * D[2, a] + cf * D[3, a]
-        fx = m * (b[2] * dx + b[3] * dy)
-        fy = m * (b[3] * dx + b[4] * dy)
-        if a >= 3:
-            bx, by = _field_change(field, changes[a - 3], x, y, b)
-            fx += m * bx + dm[a - 3] * b[0]
-            fy += m * by + dm[a - 3] * b[1]
-        D[4, a] += cf * fx + sf * fy
-        D[5, a] += cf * fy - sf * fx
+    for n in range(D.shape[0]):
+        for a in range(4):
+            dx = cf * D[n, 2, a] - sf * D[n, 3, a]
+            dy = sf * D[n, 2, a] + cf * D[n, 3, a]
+            bx, by = _field_change(field, changes[n, a], x, y, b)
+            bx += b[2] * dx + b[3] * dy
+            by += b[3] * dx + b[4] * dy
+            fx = m * bx + dm[n, a] * b[0]
+            fy = m * by + dm[n, a] * b[1]
+            D[n, 4, a] += cf * fx + sf * fy
+            D[n, 5, a] += cf * fy - sf * fx
 
 
 @njit(**PART)
-def _end_section(rod, rods, i, X, D):  # type: ignore[no-untyped-def]
-    """Move the end of section `i`, for parameters that change its length."""
+def _enter_columns(rows, cf, sf, D):  # type: ignore[no-untyped-def]
+    """Set the changes of what acts within a section, whose rod rows are `rows`."""
+    for n in range(D.shape[0]):
+        for a in range(4):
+            wx = rows[n, a, WX]
+            wy = rows[n, a, WY]
+            D[n, 6, a] = rows[n, a, E]
+            D[n, 7, a] = cf * wx + sf * wy
+            D[n, 8, a] = cf * wy - sf * wx
+
+
+@njit(**PART)
+def _end_section(rows, X, D):  # type: ignore[no-untyped-def]
+    """Move the end of a section, for parameters that change its length."""
     sine = math.sin(X[0])
     cosine = math.cos(X[0])
-    for a in range(3, D.shape[1]):
-        dh = rods[a - 3, i, H]
-        D[0, a] += dh * X[6] * X[1]
-        D[1, a] += dh * (X[4] * sine - X[5] * cosine)
-        D[2, a] -= dh * cosine
-        D[3, a] -= dh * sine
-        D[4, a] += dh * X[7]
-        D[5, a] += dh * X[8]
+    for n in range(D.shape[0]):
+        for a in range(4):
+            dh = rows[n, a, H]
+            D[n, 0, a] += dh * X[6] * X[1]
+            D[n, 1, a] += dh * (X[4] * sine - X[5] * cosine)
+            D[n, 2, a] -= dh * cosine
+            D[n, 3, a] -= dh * sine
+            D[n, 4, a] += dh * X[7]
+            D[n, 5, a] += dh * X[8]
 
 
 @njit(**PART)
 def _station_columns(r, h, order, before, grow, T, C, out):  # type: ignore[no-untyped-def]
     """Evaluate the columns at the fraction `r` of a step of length `h`.
 
-    `grow` holds, per parameter, how far the station slides along the section, as its
-    distance from the clamp is kept while lengths change.
+    `before` holds their positions where the step begins. `grow` holds how far the
+    station slides along the section, as its distance from the clamp is kept while
+    lengths change.
     """
-    theta_1 = sine = cosine = 0.0
-    order_1 = order - 1
-    for k in range(order_1, -1, -1):
-        theta_1 = theta_1 * r + (k + 1) * T[0, k + 1]
+    slope = sine = cosine = 0.0
+    for k in range(order - 1, -1, -1):
+        slope = slope * r + (k + 1) * T[0, k + 1]
         sine = sine * r + T[2, k]
         cosine = cosine * r + T[3, k]
-    for a in range(C.shape[2]):
-        theta = x = y = 0.0
-        for k in range(order, 0, -1):
-            theta = theta * r + C[k, 0, a]
-            x = x * r + C[k - 1, 3, a] / k
-            y = y * r + C[k - 1, 2, a] / k
-        out[0, a] = theta * r + C[0, 0, a]
-        out[1, a] = before[0, a] - h * r * x
-        out[2, a] = before[1, a] - h * r * y
-        if a >= 3:
-            out[0, a] += grow[a - 3] * theta_1 / h
-            out[1, a] -= grow[a - 3] * cosine
-            out[2, a] -= grow[a - 3] * sine
+    for n in range(C.shape[0]):
+        for a in range(4):
+            theta = C[n, order, 0, a]
+            x = y = 0.0
+            for k in range(order - 1, -1, -1):
+                f = 1.0 / (k + 1)
+                theta = theta * r + C[n, k, 0, a]
+                x = x * r + C[n, k, 3, a] * f
+                y = y * r + C[n, k, 2, a] * f
+            c = 4 * n + a
+            out[0, c] = theta + grow[n, a] * slope / h
+            out[1, c] = before[n, 0, a] - h * r * x - grow[n, a] * cosine
+            out[2, c] = before[n, 1, a] - h * r * y - grow[n, a] * sine
 
 
 @njit(**PART)
@@ -161,73 +176,99 @@ def _combine(D, clamps, cf, sf, out):  # type: ignore[no-untyped-def]
     Return False if the Newton matrix is singular.
     """
     d = np.empty(3)
-    for a in range(3, D.shape[1]):
-        if not solve3(D, D[0, a] - clamps[a - 3], D[2, a], D[3, a], d):
+    for c in range(3, out.shape[2]):
+        n = c // 4
+        a = c % 4
+        miss = D[n, 0, a] - clamps[n, a]
+        if not solve3(D[0], miss, D[n, 2, a], D[n, 3, a], d):
             return False
         for k in range(out.shape[0]):
             for i in range(3):
                 for j in range(3):
-                    out[k, i, a] += out[k, i, j] * d[j]
-            x = out[k, 1, a]
-            y = out[k, 2, a]
-            out[k, 1, a] = cf * x - sf * y
-            out[k, 2, a] = sf * x + cf * y
+                    out[k, i, c] += out[k, i, j] * d[j]
+            x = out[k, 1, c]
+            y = out[k, 2, c]
+            out[k, 1, c] = cf * x - sf * y
+            out[k, 2, c] = sf * x + cf * y
     return True
 
 
 @njit(cache=True, error_model="numpy")
-def _columns(rod, field, u, rods, changes, clamps, s, order, step):  # type: ignore[no-untyped-def]
-    """Return theta, x, y by parameter at the stations, shape (n, 3, 3 + p), or fail.
+def _columns(rod, field, u, rods, changes, clamps, s, order, step, out):  # type: ignore[no-untyped-def]
+    """March with a column for each unknown and parameter; return whether it went well.
 
-    The first three columns are work space.
+    Parameters
+    ----------
+    rod, field, u
+        The case and the unknowns (gamma, x_L, y_L, phi) of its equilibrium.
+    rods : ndarray, shape (sections, b, 4, 5)
+        Derivatives of the rod's rows with respect to parameters, in b blocks of four;
+        the first three columns, those of the unknowns, are zero.
+    changes, clamps : ndarray, shapes (b, 4, 6), (b, 4)
+        The same of the field (module docstring) and of the clamp angle.
+    s : ndarray, shape (n,)
+        Stations.
+    order, step
+        As of `planar_march.march`.
+    out : ndarray, shape (n, 3, 4 b)
+        Receives the derivatives of theta, x and y.
     """
-    count = 3 + rods.shape[0]
+    blocks = clamps.shape[0]
     X = np.empty(STATE)
-    D = np.empty((STATE, count))
+    D = np.zeros((blocks, STATE, 4))
     T = np.empty((4, order + 1))
-    C = np.empty((order + 1, 4, count))
-    out = np.empty((s.shape[0], 3, count))
-    grow = np.zeros(rods.shape[0])
+    C = np.empty((blocks, order + 1, 4, 4))
+    before = np.empty((blocks, 2, 4))
+    grow = np.zeros((blocks, 4))
+    dm = np.empty((blocks, 4))
     for i in range(rod.shape[0]):
-        grow += rods[:, i, H]
-    begin(u, count, X, D)
-    dm = np.zeros(rods.shape[0])
+        for n in range(blocks):
+            for a in range(4):
+                grow[n, a] += rods[i, n, a, H]
+    begin(u, 0, X, D[0])
+    D[0, 0, 0] = 1.0
     k = s.shape[0] - 1
     reached = 0.0
     for i in range(rod.shape[0]):
-        m = rod[i, M]
-        dm[:] = rods[:, i, M]
-        if i > 0:
-            m -= rod[i - 1, M]
-            dm -= rods[:, i - 1, M]
-        add_load(rod, field, i, 1.0, u, 0, X, D)
+        m = rod[i, M] - rod[i - 1, M] if i > 0 else rod[i, M]
+        for n in range(blocks):
+            for a in range(4):
+                dm[n, a] = rods[i, n, a, M]
+                if i > 0:
+                    dm[n, a] -= rods[i - 1, n, a, M]
+        add_load(rod, field, i, 1.0, u, 0, X, D[0])
         cf = math.cos(u[3])
         sf = math.sin(u[3])
         if i == 0:
-            D[2, 1] = D[3, 2] = cf
-            D[3, 1] = -sf
-            D[2, 2] = sf
+            D[0, 2, 1] = D[0, 3, 2] = cf
+            D[0, 3, 1] = -sf
+            D[0, 2, 2] = sf
         x = u[1] + cf * X[2] - sf * X[3]
         y = u[2] + sf * X[2] + cf * X[3]
         _load_columns(field, m, dm, changes, x, y, cf, sf, D)
-        enter_section(rod, i, 1.0, u, 0, X, D)
-        D[6, 3:] = rods[:, i, E]
-        D[7, 3:] = cf * rods[:, i, WX] + sf * rods[:, i, WY]
-        D[8, 3:] = cf * rods[:, i, WY] - sf * rods[:, i, WX]
-        n = substeps(rod[i, H], X, step)
-        h = rod[i, H] / n
-        for j in range(n):
-            before = D[2:4].copy()
-            taylor_step(h, order, X, D, count, T, C)
-            last = i + 1 == rod.shape[0] and j + 1 == n
+        enter_section(rod, i, 1.0, u, 0, X, D[0])
+        _enter_columns(rods[i], cf, sf, D)
+        count = substeps(rod[i, H], X, step)
+        h = rod[i, H] / count
+        for j in range(count):
+            series(h, order, X, T)
+            for n in range(blocks):
+                for a in range(4):
+                    before[n, 0, a] = D[n, 2, a]
+                    before[n, 1, a] = D[n, 3, a]
+                column_step(h, order, X, T, D[n], C[n])
+            last = i + 1 == rod.shape[0] and j + 1 == count
             while k >= 0 and (last or 1.0 - s[k] <= reached + h + 1e-13):
                 r = (1.0 - s[k] - reached) / h
                 _station_columns(r, h, order, before, grow, T, C, out[k])
                 k -= 1
+            advance(h, order, X, T)
             reached += h
-        _end_section(rod, rods, i, X, D)
-        grow -= rods[:, i, H]
-    return _combine(D, clamps, cf, sf, out), out
+        _end_section(rods[i], X, D)
+        for n in range(blocks):
+            for a in range(4):
+                grow[n, a] -= rods[i, n, a, H]
+    return _combine(D, clamps, cf, sf, out)
 
 
 def sensitivities(
@@ -286,18 +327,7 @@ def sensitivities(
     u = solve_planar(rod, array, clamp, 0.0, stations(2), ORDER, STEP)[-1]
     names = tuple(parameters)
     records = [_record(name, specimen, field, support) for name in names]
-    count = len(names)
-    good, out = _columns(
-        rod,
-        array,
-        u,
-        np.array([r.rod for r in records]).reshape(count, *rod.shape),
-        np.array([r.field for r in records]).reshape(count, 6),
-        np.array([r.clamp for r in records]).reshape(count),
-        s / specimen.length_mm,
-        ORDER + 4,
-        STEP,
-    )
+    good, out = _derivatives(rod, array, u, records, s / specimen.length_mm)
     if not good or not np.all(np.isfinite(out)):
         raise SolverError(
             f"{specimen.name!r} stands at a fold of its equilibria: its shape has no "
@@ -307,10 +337,28 @@ def sensitivities(
         solution=solution,
         s_mm=s,
         parameters=names,
-        dx_mm=np.ascontiguousarray(out[:, 1, 3:]) * specimen.length_mm,
-        dy_mm=np.ascontiguousarray(out[:, 2, 3:]) * specimen.length_mm,
-        dtheta_rad=np.ascontiguousarray(out[:, 0, 3:]),
+        dx_mm=out[:, 1] * specimen.length_mm,
+        dy_mm=out[:, 2] * specimen.length_mm,
+        dtheta_rad=out[:, 0].copy(),
     )
+
+
+def _derivatives(
+    rod: Array, field: Array, u: Array, records: Sequence[_Record], s: Array
+) -> tuple[bool, Array]:
+    """Return theta, x and y by parameter, shape (n, 3, p), and whether they exist."""
+    blocks = (3 + len(records) + 3) // 4
+    rods = np.zeros((len(rod), blocks, 4, rod.shape[1]))
+    changes = np.zeros((blocks, 4, 6))
+    clamps = np.zeros((blocks, 4))
+    for column, record in enumerate(records, start=3):
+        n, a = divmod(column, 4)
+        rods[:, n, a] = record.rod
+        changes[n, a] = record.field
+        clamps[n, a] = record.clamp
+    out = np.empty((len(s), 3, 4 * blocks))
+    good = _columns(rod, field, u, rods, changes, clamps, s, ORDER + 4, STEP, out)
+    return good, out[:, :, 3 : 3 + len(records)]
 
 
 def _stations(s_mm: ArrayLike | None, length_mm: float) -> Array:

@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..core.centreline import Centreline
 from ..core.errors import InputError, SolverError
@@ -17,9 +21,10 @@ from .fields import (
     Support,
     UniformField,
 )
-from .planar import FAILED, GONE, ORDER, STEP, TOO_STRONG, TOUCHES, solve_planar
+from .planar import GONE, ORDER, STEP, TOO_STRONG, TOUCHES, solve_planar
 from .scaling import field_array, rod_array, stations, stiffness_Nmm2
 
+Array = NDArray[np.float64]
 STATUS = (STABLE, UNSTABLE, PULLED_IN)
 NO_SUPPORT = Support()
 
@@ -85,9 +90,7 @@ def solve(
 
         spatial = solve_spatial(specimen, field, support=support, points=points)
         return spatial.seen_from_above()
-    rod = rod_array(specimen, support)
-    length_mm = specimen.length_mm
-    margin = 0.5 * max(specimen.sides_mm) / length_mm
+    rod, length_mm, margin, unit_Nm = _held(specimen, support)
     s = stations(points)
     outcome, index, load, error, bx, by, moment, table, _ = solve_planar(
         rod,
@@ -102,24 +105,32 @@ def solve(
         raise failure(outcome, specimen, field, load)
     centreline = None
     if outcome != GONE:
-        if not math.isfinite(float(table.sum())):
-            raise failure(FAILED, specimen, field, load)
+        x, y, theta, kappa = table
         centreline = Centreline._trusted(
-            s * length_mm,
-            table[0] * length_mm,
-            table[1] * length_mm,
-            table[2],
-            table[3] / length_mm,
+            s * length_mm, x * length_mm, y * length_mm, theta, kappa / length_mm
         )
     return Solution(
         centreline=centreline,
         status=STATUS[outcome],
         morse_index=index if centreline else -1,
-        error_mm=error * length_mm if centreline else float("nan"),
+        error_mm=error * length_mm if centreline else math.nan,
         flux_tip_mT=(mT_from_T(bx), mT_from_T(by)),
-        root_moment_Nm=moment * stiffness_Nmm2(specimen)[0] / length_mm * 1e-3,
+        root_moment_Nm=moment * unit_Nm,
         load_limit=load,
     )
+
+
+@lru_cache(maxsize=256)
+def _held(specimen: Specimen, support: Support) -> tuple[Array, float, float, float]:
+    """Return a held rod as the kernel takes it, and what turns its numbers into units.
+
+    The array, the length in mm, half the largest side over the length, and the unit of
+    moments in N m.
+    """
+    rod = rod_array(specimen, support)
+    length_mm = specimen.length_mm
+    margin = 0.5 * max(specimen.sides_mm) / length_mm
+    return rod, length_mm, margin, stiffness_Nmm2(specimen)[0] / length_mm * 1e-3
 
 
 def failure(
