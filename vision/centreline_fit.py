@@ -16,90 +16,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .curve import Curve
+from .spline import bends, design, knots_between
+
 Array = NDArray[np.float64]
 
-_DEGREE = 3
 SHARED = 8.0
 """Stations 1 px apart that carry one station's worth of information: bilinear samples,
 compressed pictures and shade on the paper make neighbours alike."""
 
 _FAIR = 0.1
 """Weight of the penalty before the last step, in units of the data's."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Curve:
-    """A fitted curve on an even grid of arc length.
-
-    Parameters
-    ----------
-    s : ndarray, shape (n,)
-        Arc length.
-    points : ndarray, shape (n, 2)
-        Position (x, y).
-    theta, kappa : ndarray, shape (n,)
-        Tangent angle, unwrapped, and its derivative.
-    """
-
-    s: Array
-    points: Array
-    theta: Array
-    kappa: Array
-
-    @property
-    def tangents(self) -> Array:
-        """Unit tangents, shape (n, 2)."""
-        tangents = np.empty((len(self.theta), 2))
-        np.cos(self.theta, out=tangents[:, 0])
-        np.sin(self.theta, out=tangents[:, 1])
-        return tangents
-
-    @property
-    def normals(self) -> Array:
-        """Unit normals to the right in the picture (y down), shape (n, 2)."""
-        normals = np.empty((len(self.theta), 2))
-        np.negative(np.sin(self.theta), out=normals[:, 0])
-        np.cos(self.theta, out=normals[:, 1])
-        return normals
-
-    def at(self, s: Array) -> tuple[Array, Array]:
-        """Return points (n, 2) and angles (n,) at any s; beyond the ends an arc."""
-        s = np.ascontiguousarray(s, dtype=np.float64)
-        points, theta = np.empty((len(s), 2)), np.empty(len(s))
-        _evaluate(s, self.s, self.points, self.theta, self.kappa, points, theta)
-        return points, theta
-
-
-@njit(cache=True)
-def _evaluate(
-    at: Array, s: Array, points: Array, theta: Array, kappa: Array,
-    out: Array, angle: Array,
-) -> None:  # fmt: skip
-    """Points and angles of a curve: curvature linear between stations."""
-    last = s.size - 1
-    step = s[1] - s[0]
-    for i in range(at.size):
-        inside = min(max(at[i], s[0]), s[last])
-        place = (inside - s[0]) / step
-        k = min(max(int(place), 0), last - 1)
-        u = (place - k) * step
-        slope = (kappa[k + 1] - kappa[k]) / step
-        middle = theta[k] + 0.5 * u * (kappa[k] + 0.25 * slope * u)
-        turned = theta[k] + u * (kappa[k] + 0.5 * slope * u)
-        x, y = points[k, 0] + u * np.cos(middle), points[k, 1] + u * np.sin(middle)
-        beyond = at[i] - inside
-        if beyond != 0.0:
-            bend = kappa[last] if beyond > 0.0 else kappa[0]
-            middle = turned + 0.5 * beyond * bend
-            x, y = x + beyond * np.cos(middle), y + beyond * np.sin(middle)
-            turned += beyond * bend
-        out[i, 0], out[i, 1], angle[i] = x, y, turned
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,7 +45,7 @@ class CurveFit:
     residual : ndarray, shape (n,)
         Normal distance of the measured points; NaN where there is none.
     noise : float
-        Standard deviation of a point.
+        Standard deviation of a measurement.
     correlation : float
         Factor by which correlated residuals widen variances.
     freedom : float
@@ -168,6 +100,7 @@ def fit_curve(
     theta: Array | None = None,
     stiffness: float | None = None,
     shared: float = SHARED,
+    within: float = 0.0,
 ) -> CurveFit:
     """Fit theta(s) to points measured near an even grid of arc length.
 
@@ -178,7 +111,7 @@ def fit_curve(
     points : ndarray, shape (n, 2)
         Measured positions; only their distance along the normal counts.
     weights : ndarray, shape (n,)
-        0 where nothing was measured.
+        Measurements that each point is the mean of; 0 where there was none.
     spacing : float
         Distance of knots.
     joints : sequence of float
@@ -190,37 +123,39 @@ def fit_curve(
     stiffness : float, optional
         Weight of the penalty, px^5; the most likely one when not given.
     shared : float
-        Neighbouring stations that count as one: the fewer, the more supple the curve.
+        Neighbouring measurements that count as one: the fewer, the more supple the
+        curve.
+    within : float
+        Sum of the squares of the measurements about the means that the points are.
 
     Returns
     -------
     CurveFit
         With covariances.
     """
-    knots = _knots(s[0], s[-1], spacing, joints)
-    basis, slopes = _design(knots, s)
-    basis_mid, _ = _design(knots, 0.5 * (s[1:] + s[:-1]))
-    bends = _bends(knots)
-    penalty = bends.T @ bends
+    knots = knots_between(s[0], s[-1], spacing, joints)
+    basis, slopes = design(knots, s)
+    basis_mid, _ = design(knots, 0.5 * (s[1:] + s[:-1]))
+    bend = bends(knots)
+    penalty = bend.T @ bend
     if theta is None:
         theta = _chord_angles(points)
-    weight = weights / max(float(weights.max()), 1e-12)
     coefficients = _start(basis, theta, penalty * spacing**5)
-    origin = _origin(s, points, weight, basis_mid @ coefficients)
+    origin = _origin(s, points, weights, basis_mid @ coefficients)
     for turn in range(iterations):
         path = _integrate(s, origin, coefficients, basis, basis_mid, slopes)
         jacobian = _jacobian(path, basis_mid)
         system = _solve(
-            jacobian, _residual(points, path, weight), weight, penalty, coefficients,
-            stiffness, shared, last=turn == iterations - 1,
+            jacobian, _residual(points, path, weights), weights, penalty, coefficients,
+            stiffness, shared, within, last=turn == iterations - 1,
         )  # fmt: skip
         turned = np.array([-path.rate[0, 1], path.rate[0, 0]])
         origin = origin + system.change[0] * turned
         coefficients = coefficients + system.change[1:]
     path = _integrate(s, origin, coefficients, basis, basis_mid, slopes)
-    residual = _residual(points, path, weight)
+    residual = _residual(points, path, weights)
     return _with_covariance(
-        path.curve, residual, weight, jacobian, system, basis, slopes
+        path.curve, residual, weights, within, jacobian, system, basis, slopes
     )
 
 
@@ -230,79 +165,6 @@ class _System:
     inverse_root: Array
     freedom: float
     shared: float
-
-
-def _knots(first: float, last: float, spacing: float, joints: Sequence[float]) -> Array:
-    inner = [joint for joint in joints if first + spacing < joint < last - spacing]
-    ends = [first, *sorted(inner), last]
-    pieces: list[Array] = [np.full(_DEGREE, first)]
-    for low, high in pairwise(ends):
-        count = max(round((high - low) / spacing), 2)
-        pieces.append(np.linspace(low, high, count + 1)[:-1])
-        if high != last:
-            pieces.append(np.full(_DEGREE - 1, high))
-    pieces.append(np.full(_DEGREE + 1, last))
-    return np.concatenate(pieces)
-
-
-def _design(knots: Array, s: Array) -> tuple[Array, Array]:
-    """Return the cubic B-splines and their derivatives at s, each (n, count)."""
-    basis = np.zeros((len(s), len(knots) - _DEGREE - 1))
-    slopes = np.zeros_like(basis)
-    _fill_basis(knots, s, basis, slopes)
-    return basis, slopes
-
-
-@njit(cache=True)
-def _fill_basis(knots: Array, s: Array, basis: Array, slopes: Array) -> None:
-    """Cox and de Boor's recurrence; s must not fall."""
-    count = basis.shape[1]
-    value = np.zeros(4)
-    lower = np.zeros(4)
-    k = 3
-    for i in range(s.size):
-        x = s[i]
-        while k < count - 1 and x >= knots[k + 1]:
-            k += 1
-        value[:] = 0.0
-        value[3] = 1.0
-        for degree in range(1, 4):
-            if degree == 3:
-                lower[:] = value
-            for j in range(3 - degree, 4):
-                left = k - 3 + j
-                total = 0.0
-                span = knots[left + degree] - knots[left]
-                if j > 3 - degree and span > 0.0:
-                    total += (x - knots[left]) / span * value[j]
-                span = knots[left + degree + 1] - knots[left + 1]
-                if j < 3 and span > 0.0:
-                    total += (knots[left + degree + 1] - x) / span * value[j + 1]
-                value[j] = total
-        for j in range(4):
-            left = k - 3 + j
-            basis[i, left] = value[j]
-            rate = 0.0
-            span = knots[left + 3] - knots[left]
-            if j > 0 and span > 0.0:
-                rate += lower[j] / span
-            span = knots[left + 4] - knots[left + 1]
-            if j < 3 and span > 0.0:
-                rate -= lower[j + 1] / span
-            slopes[i, left] = 3.0 * rate
-
-
-def _bends(knots: Array) -> Array:
-    """Return B with |B c|^2 the integral of theta'''^2, constant between knots."""
-    low, high = knots[_DEGREE:-_DEGREE - 1], knots[_DEGREE + 1:-_DEGREE]  # fmt: skip
-    real = high > low
-    low, length = low[real], (high - low)[real]
-    # Second differences of theta' at points well inside, where no knot is in doubt.
-    inner = low[:, None] + length[:, None] * np.array([0.1, 0.5, 0.9])
-    _, slopes = _design(knots, inner.ravel())
-    first, middle, last = slopes.reshape(len(low), 3, -1).transpose(1, 0, 2)
-    bend = (first - 2.0 * middle + last) / (0.4 * length[:, None]) ** 2
-    return np.asarray(bend * np.sqrt(length)[:, None])
 
 
 def _chord_angles(points: Array) -> Array:
@@ -422,18 +284,18 @@ def _fill_jacobian(
 
 def _solve(
     jacobian: Array, residual: Array, weight: Array, penalty: Array,
-    coefficients: Array, strength: float | None, shared: float, *, last: bool,
+    coefficients: Array, strength: float | None, shared: float, within: float, *,
+    last: bool,
 ) -> _System:  # fmt: skip
     """Solve for the change, with the most likely weight of the penalty (REML).
 
-    Neighbouring residuals share pixels, so `shared` of them count as one. One
-    eigenproblem serves every weight: with normal = L L^T and L^-1 P L^-T = U d U^T,
-    normal + w P = (L U) (1 + w d) (L U)^T. Before the last step any fair weight does:
-    it moves only the point at which the next step is taken.
+    Neighbouring residuals share pixels, so `shared` of them count as one. Before the
+    last step any fair weight does: it moves only the point at which the next step is
+    taken.
     """
-    weighted = jacobian * np.sqrt(weight / shared)[:, None]
-    normal = weighted.T @ weighted
-    right = jacobian.T @ (weight * residual / shared)
+    weighted = jacobian * (weight / shared)[:, None]
+    normal = weighted.T @ jacobian
+    right = weighted.T @ residual
     size = len(right)
     full = np.zeros((size, size))
     full[1:, 1:] = penalty
@@ -448,56 +310,73 @@ def _solve(
         fair = _FAIR * scale if strength is None else strength
         change = np.linalg.solve(normal + fair * full, right - fair * pull)
         return _System(np.asarray(change, dtype=np.float64), full, 0.0, shared)
-    if strength is not None:
-        stiff = normal + strength * full
-        root = np.asarray(np.linalg.inv(np.linalg.cholesky(stiff)), np.float64).T
-        change = root @ (root.T @ (right - strength * pull))
-        return _System(change, root, float(np.sum(root * (normal @ root))), shared)
-    inverse = np.linalg.inv(np.linalg.cholesky(normal))
-    d, u = np.linalg.eigh(inverse @ full @ inverse.T)
-    d = np.maximum(d, 0.0)
-    z = inverse.T @ u
-    force, bend = z.T @ right, z.T @ pull
-    total = float(np.sum(weight * residual**2)) / shared
-    stored = float(coefficients @ pull[1:])
-    count = float(np.count_nonzero(weight)) / shared
-    strength = _most_likely(scale, d, force, bend, total, stored, max(count - 4.0, 1.0))
-    growth = 1.0 + strength * d
-    root = z / np.sqrt(growth)
-    change = z @ ((force - strength * bend) / growth)
-    return _System(change, root, float(np.sum(1.0 / growth)), shared)
+    if strength is None:
+        total = (float(weight @ residual**2) + within) / shared
+        stored = float(coefficients @ pull[1:])
+        count = max(float(weight.sum()) / shared - 4.0, 1.0)
+        strength = _most_likely(scale, normal, full, right, pull, total, stored, count)
+    stiff = normal + strength * full
+    root = np.asarray(np.linalg.inv(np.linalg.cholesky(stiff)), np.float64).T
+    change = root @ (root.T @ (right - strength * pull))
+    return _System(change, root, float(np.sum(root * (normal @ root))), shared)
 
 
 @njit(cache=True)
 def _most_likely(
-    scale: float, d: Array, force: Array, bend: Array, total: float, stored: float,
-    count: float,
+    scale: float, normal: Array, penalty: Array, right: Array, pull: Array,
+    total: float, stored: float, count: float,
 ) -> float:  # fmt: skip
-    """Return the penalty weight of greatest restricted likelihood."""
-    best, least = scale, np.inf
-    for power in range(-36, 20):
-        weight = scale * 10.0 ** (0.25 * power)
-        gain, logs = 0.0, 0.0
-        for k in range(d.size):
-            growth = 1.0 + weight * d[k]
-            gain += (force[k] - weight * bend[k]) ** 2 / growth
-            logs += np.log(growth)
-        left = max(total + weight * stored - gain, 1e-12 * total + 1e-30)
-        score = count * np.log(left) + logs - (d.size - 4.0) * np.log(weight)
-        if score < least:
-            best, least = weight, score
-    return best
+    """Return the penalty weight of greatest restricted likelihood.
+
+    It is looked for over 14 decades, and then in quarters of a decade about the best.
+    """
+    best, least = 0, np.inf
+    for turn in range(2):
+        centre = best
+        for k in range(14) if turn == 0 else range(-3, 4):
+            power = 4 * k - 36 if turn == 0 else centre + k
+            weight = scale * 10.0 ** (0.25 * power)
+            gain, logs = _eliminated(normal + weight * penalty, right - weight * pull)
+            left = max(total + weight * stored - gain, 1e-12 * total + 1e-30)
+            score = count * np.log(left) + logs - (len(right) - 4.0) * np.log(weight)
+            if score < least:
+                best, least = power, score
+    return float(scale * 10.0 ** (0.25 * best))
+
+
+@njit(cache=True)
+def _eliminated(matrix: Array, right: Array) -> tuple[float, float]:
+    """Return right^T matrix^-1 right, and the logarithm of the determinant.
+
+    Cholesky's method, in place: the matrices are too small for a library's threads.
+    """
+    size = right.size
+    gain, logs = 0.0, 0.0
+    for k in range(size):
+        pivot = matrix[k, k]
+        if not pivot > 0.0:
+            return 0.0, np.inf
+        gain += right[k] ** 2 / pivot
+        logs += np.log(pivot)
+        for j in range(k + 1, size):
+            share = matrix[k, j] / pivot
+            right[j] -= share * right[k]
+            for i in range(j, size):
+                matrix[j, i] -= share * matrix[k, i]
+    return gain, logs
 
 
 def _with_covariance(
-    curve: Curve, residual: Array, weight: Array, jacobian: Array, system: _System,
-    basis: Array, slopes: Array,
+    curve: Curve, residual: Array, weight: Array, within: float, jacobian: Array,
+    system: _System, basis: Array, slopes: Array,
 ) -> CurveFit:  # fmt: skip
+    """Widen the covariance by what the residuals of neighbours have in common."""
     used = weight > 0.0
-    count = int(np.count_nonzero(used))
-    squares = float(weight @ residual**2)
-    noise = np.sqrt(squares / max(count - system.freedom, 1.0))
-    correlation = _correlation(residual, used, 24)
+    count, between = float(weight.sum()), float(weight @ residual**2)
+    noise = np.sqrt((between + within) / max(count - system.freedom, 1.0))
+    each = count / max(int(np.count_nonzero(used)), 1)
+    alike = _correlation(residual, used, max(round(24.0 / each), 6))
+    correlation = max(alike * each * between / max(between + within, 1e-300), 1.0)
     return CurveFit(
         curve=curve,
         residual=np.where(used, residual, np.nan),

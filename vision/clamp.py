@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .centreline_fit import Curve
+from .curve import Curve
 from .tip import STEP_PX, EndFace, crossings_of, lanes, line_through
 
 Array = NDArray[np.float64]

@@ -18,6 +18,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from .robust import median
+
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 
@@ -67,7 +69,7 @@ class Edges:
     def contrast(self) -> float:
         """Median difference between paper and rod."""
         paper = 0.5 * (self.outer_low + self.outer_high)
-        return float(np.nanmedian(paper - self.inner))
+        return median(paper - self.inner)
 
     @property
     def blur(self) -> float:
@@ -78,8 +80,7 @@ class Edges:
                 (self.outer_high - self.inner) / self.slope_high,
             ]
         )
-        rise = rise[np.isfinite(rise) & (rise > 0.0)]
-        return float(np.median(rise)) / _ROOT_2PI if rise.size else float("nan")
+        return median(rise) / _ROOT_2PI
 
 
 def find_edges(
@@ -91,6 +92,7 @@ def find_edges(
     *,
     reach: float,
     blur: float,
+    fuzz: float = 0.0,
     sign: float = 1.0,
     smooth: int = 6,
 ) -> Edges:
@@ -108,6 +110,8 @@ def find_edges(
         How far from there to look, in px.
     blur : float
         Standard deviation of the blur, in px: the levels are taken clear of it.
+    fuzz : float
+        How far hairs and burrs reach, in px: the levels are taken clear of these too.
     sign : float
         -1 for a light rod.
     smooth : int
@@ -118,35 +122,37 @@ def find_edges(
     Edges
         NaN where no edge was found.
     """
-    near, clear = max(0.6, 1.1 * blur), max(1.5, 2.2 * blur)
-    window = max(4.0, 3.0 * blur)
-    span = float(np.max(np.maximum(-low, high))) + reach + clear + window + 1.0
-    count = int(np.ceil(span / STEP_PX))
-    strip = np.empty((len(points), 2 * count + 1), dtype=np.float32)
-    _sample(grey, points, normals, STEP_PX, np.float32(sign), strip)
+    half = 0.5 * (median(high) - median(low))
+    wide = max(blur, fuzz)
+    gaps = max(0.6, 1.1 * wide), max(1.5, 2.2 * wide)
+    window = max(4.0, 3.0 * wide)
+    span = max(reach + 1.0, gaps[1] + window)
+    # Samples lie a quarter of a pixel and more to either side of the expected edge; a
+    # profile reaches no further in than the axis.
+    before = max(int(min(span, half) / STEP_PX + 0.5), 2)
+    strip = np.empty((len(points), before + int(span / STEP_PX) + 1), np.float32)
+    filters = np.concatenate(
+        [_level_filter(strip.shape[1], before, gap, window, blur) for gap in gaps]
+    )
     out = np.full((2, 5, len(points)), np.nan)
-    wider = np.zeros((2, len(points)))
-    for side, expected in enumerate((-low, high)):
-        # Profiles from the axis outwards.
-        half = strip[:, count::-1] if side == 0 else strip[:, count:]
-        half = np.ascontiguousarray(half)
-        levels = np.empty((2, 3, len(points)))
-        for rows, gap in zip(levels, (near, clear), strict=True):
-            _levels(half, expected, gap, window, blur, rows)
-            for row in rows:
-                row[:] = _running_mean(row, smooth)
-        _cross(half, expected, levels[0], reach, blur, out[side])
-        out[side, 2:] = levels[1]
-        middle = 0.5 * (levels[:, 0] + levels[:, 1]) + levels[:, 2] * blur / _ROOT_2PI
-        wider[side] = (middle[1] - middle[0]) / out[side, 1]
+    growth = np.zeros(len(points))
+    levels = np.empty((6, len(points)))
+    for side, (outwards, edge) in enumerate(((-1.0, low), (1.0, high))):
+        _sample(grey, points, normals, edge, outwards, before, np.float32(sign), strip)
+        _levels(strip, filters, levels)
+        for row in levels:
+            _smooth(row, smooth)
+        _cross(strip, before, levels[:3], reach, blur, out[side])
+        out[side, 0] += outwards * edge
+        out[side, 2:] = levels[3:]
+        middle = 0.5 * (levels[0::3] + levels[1::3]) + levels[2::3] * blur / _ROOT_2PI
+        growth += 0.5 * (middle[1] - middle[0]) / out[side, 1]
     # Levels close to the edges know the shade and so the middle; those clear of the
     # blur, whose shape is not quite a Gaussian's, know the width.
-    growth = 0.5 * (wider[0] + wider[1])
     out[:, 0] += np.where(np.abs(growth) < 0.5, growth, 0.0)
-    inner = 0.5 * (out[0, 2] + out[1, 2])
     return Edges(
         low=-out[0, 0], high=out[1, 0], slope_low=out[0, 1], slope_high=out[1, 1],
-        inner=inner, outer_low=out[0, 3], outer_high=out[1, 3],
+        inner=0.5 * (out[0, 2] + out[1, 2]), outer_low=out[0, 3], outer_high=out[1, 3],
         shade_low=out[0, 4], shade_high=out[1, 4],
     )  # fmt: skip
 
@@ -181,39 +187,63 @@ def rough_edges(
         The level taken.
     """
     count = int(np.ceil((reach + 2.0) / STEP_PX))
-    strip = np.empty((len(points), 2 * count + 1), dtype=np.float32)
-    _sample(grey, points, normals, STEP_PX, np.float32(sign), strip)
+    strip = np.empty((len(points), 2 * count), dtype=np.float32)
+    axis = np.zeros(len(points))
+    _sample(grey, points, normals, axis, 1.0, count, np.float32(sign), strip)
     if level is None:
-        core = strip[:, 2 * count // 3 : 4 * count // 3]
-        dark = float(np.median(core[np.isfinite(core)]))
-        seen = np.where(np.isfinite(strip), strip, -np.inf)
-        paper = float(np.median(seen.max(axis=1)))
+        dark = median(strip[:, 2 * count // 3 : 4 * count // 3].ravel())
+        paper = median(np.fmax.reduce(strip, axis=1))
         level = dark + 0.27 * (paper - dark)
     inside = strip < level
-    offsets = (np.arange(2 * count + 1) - count) * STEP_PX
+    offsets = (np.arange(2 * count) - count + 0.5) * STEP_PX
     some = inside.any(axis=1)
     low = np.where(some, offsets[np.argmax(inside, axis=1)], np.nan)
     high = np.where(some, offsets[::-1][np.argmax(inside[:, ::-1], axis=1)], np.nan)
     return low - 0.5 * STEP_PX, high + 0.5 * STEP_PX, level
 
 
-def sample(grey: Image, x: Array, y: Array) -> Array:
-    """Return the light at points by bilinear interpolation; NaN outside."""
-    out = np.empty(x.size)
-    _sample_points(
-        grey, np.ascontiguousarray(x.ravel()), np.ascontiguousarray(y.ravel()), out
-    )
-    return out.reshape(x.shape)
+@njit(cache=True)
+def _level_filter(
+    columns: int, before: int, gap: float, window: float, blur: float
+) -> Array:
+    """Return the weights of samples in inner level, outer level and its slope, (3, m).
+
+    Least squares of a step onto a slope, both blurred by a Gaussian, on samples at
+    either side, `gap` clear of the edge: so the blurred edge's own tails count neither
+    as rod nor as shade. The outer level is that at the edge.
+    """
+    design = np.zeros((columns, 3))
+    for k in range(columns):
+        t = (k - before + 0.5) * STEP_PX
+        if gap <= abs(t) <= gap + window:
+            outside = 0.5 * (1.0 + math.erf(t / (blur * math.sqrt(2.0))))
+            bell = math.exp(-0.5 * (t / blur) ** 2) / _ROOT_2PI
+            design[k, 0] = 1.0 - outside
+            design[k, 1] = outside
+            design[k, 2] = t * outside + blur * bell
+    normal = design.T @ design
+    if normal[0, 0] < 0.5:
+        # Narrower than the blur: the darkest there is, at the axis.
+        design[0, 0] += 1.0
+        normal = design.T @ design
+    return np.asarray(np.linalg.solve(normal, design.T))
 
 
-def _running_mean(values: Array, half: int) -> Array:
-    """Mean over neighbours, NaN left out."""
-    good = np.isfinite(values)
-    window = np.ones(2 * half + 1)
-    total = np.convolve(np.where(good, values, 0.0), window, mode="full")[half:-half]
-    count = np.convolve(good.astype(np.float64), window, mode="full")[half:-half]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(total / count)
+@njit(cache=True)
+def _smooth(values: Array, half: int) -> None:
+    """Replace by the mean over neighbours, NaN left out."""
+    count = values.size
+    old = values.copy()
+    total, number = 0.0, 0
+    for i in range(-half, count):
+        if i + half < count and not np.isnan(old[i + half]):
+            total += old[i + half]
+            number += 1
+        if i - half > 0 and not np.isnan(old[i - half - 1]):
+            total -= old[i - half - 1]
+            number -= 1
+        if i >= 0:
+            values[i] = total / number if number else np.nan
 
 
 @njit(cache=True)
@@ -230,27 +260,27 @@ def _bilinear(grey: Image, x: float, y: float) -> float:
 
 
 @njit(cache=True)
-def _sample_points(grey: Image, x: Array, y: Array, out: Array) -> None:
-    for k in range(x.size):
-        out[k] = _bilinear(grey, x[k], y[k])
-
-
-@njit(cache=True)
 def _sample(
-    grey: Image, points: Array, normals: Array, step: float, sign: float, strip: Image
-) -> None:
-    """Fill the strip: one row a station, columns along the normal, centre on it."""
+    grey: Image, points: Array, normals: Array, edge: Array, outwards: float,
+    before: int, sign: float, strip: Image,
+) -> None:  # fmt: skip
+    """Fill the strip: a row a station, columns outwards, the edge behind `before`."""
     count, columns = strip.shape
-    middle = columns // 2
     height, width = grey.shape
-    reach = middle * step
     for i in range(count):
-        x, y = points[i, 0], points[i, 1]
-        u, v = normals[i, 0] * step, normals[i, 1] * step
-        if reach < x < width - 1.001 - reach and reach < y < height - 1.001 - reach:
+        u, v = outwards * normals[i, 0], outwards * normals[i, 1]
+        first = outwards * edge[i] + (0.5 - before) * STEP_PX
+        last = first + (columns - 1) * STEP_PX
+        x, y = points[i, 0] + first * u, points[i, 1] + first * v
+        far_x, far_y = points[i, 0] + last * u, points[i, 1] + last * v
+        u, v = STEP_PX * u, STEP_PX * v
+        if (
+            min(x, far_x) >= 0.0 and max(x, far_x) < width - 1.001
+            and min(y, far_y) >= 0.0 and max(y, far_y) < height - 1.001
+        ):  # fmt: skip
             # Well inside: no sample needs to be checked.
             for k in range(columns):
-                px, py = x + (k - middle) * u, y + (k - middle) * v
+                px, py = x + k * u, y + k * v
                 j, m = int(px), int(py)
                 fx, fy = np.float32(px - j), np.float32(py - m)
                 a, b = grey[m, j], grey[m, j + 1]
@@ -259,101 +289,57 @@ def _sample(
                 strip[i, k] = sign * (top + (c + (d - c) * fx - top) * fy)
             continue
         for k in range(columns):
-            t = (k - middle) * step
-            strip[i, k] = sign * _bilinear(
-                grey, points[i, 0] + t * normals[i, 0], points[i, 1] + t * normals[i, 1]
-            )
+            strip[i, k] = sign * _bilinear(grey, x + k * u, y + k * v)
 
 
 @njit(cache=True)
-def _levels(
-    half: Image, expected: Array, near: float, window: float, blur: float, levels: Array
-) -> None:
-    """Inner level, outer level at the expected edge, and slope of the outer one.
-
-    Least squares of a step onto a slope, both blurred by a Gaussian, on samples at
-    either side: so the blurred edge's own tails count neither as rod nor as shade.
-    """
-    count, columns = half.shape
-    step = 0.5
+def _levels(strip: Image, filters: Array, levels: Array) -> None:
+    """Fill levels, (6, n), with what both filters make of every profile."""
+    count, columns = strip.shape
     for i in range(count):
-        edge = expected[i]
-        first = int(np.ceil(max(edge - near - window, 0.0) / step))
-        last = min(int((edge + near + window) / step), columns - 1)
-        n_out = 0
-        aa, ab, ac, bb, bc, cc = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        ga, gb, gc = 0.0, 0.0, 0.0
-        for k in range(first, last + 1):
-            t, g = k * step - edge, half[i, k]
-            if abs(t) < near:
-                continue
-            z = t / (1.4142135623730951 * blur)
-            b = 0.5 * (1.0 + math.erf(z))
-            a = 1.0 - b
-            c = t * b + 0.3989422804 * blur * math.exp(-z * z)
-            n_out += t > 0.0
-            aa += a * a
-            ab += a * b
-            ac += a * c
-            bb += b * b
-            bc += b * c
-            cc += c * c
-            ga += a * g
-            gb += b * g
-            gc += c * g
-        if aa < 0.5:
-            # Narrower than the blur: the darkest there is, at the axis.
-            dark = half[i, 0]
-            aa += 1.0
-            ga += dark
-        # Elimination of the three normal equations.
-        b1, b2, h1 = bb - ab * ab / aa, bc - ab * ac / aa, gb - ab * ga / aa
-        c2, h2 = cc - ac * ac / aa, gc - ac * ga / aa
-        det = b1 * c2 - b2 * b2
-        if n_out < 3 or not det > 1e-9:
-            levels[0, i] = ga / aa
-            levels[1, i] = np.nan
-            levels[2, i] = np.nan
-            continue
-        outer = (h1 * c2 - h2 * b2) / det
-        slope = (h2 * b1 - h1 * b2) / det
-        levels[0, i] = (ga - ab * outer - ac * slope) / aa
-        levels[1, i] = outer
-        levels[2, i] = slope
+        a, b, c, d, e, f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(columns):
+            g = strip[i, k]
+            a += filters[0, k] * g
+            b += filters[1, k] * g
+            c += filters[2, k] * g
+            d += filters[3, k] * g
+            e += filters[4, k] * g
+            f += filters[5, k] * g
+        levels[0, i], levels[1, i], levels[2, i] = a, b, c
+        levels[3, i], levels[4, i], levels[5, i] = d, e, f
 
 
 @njit(cache=True)
 def _cross(
-    half: Image, expected: Array, levels: Array, reach: float, blur: float, out: Array
+    strip: Image, before: int, levels: Array, reach: float, blur: float, out: Array
 ) -> None:
     """Find the crossing nearest to the expected place; fit a line through 4 samples."""
-    count, columns = half.shape
-    step = 0.5
+    count, columns = strip.shape
     for i in range(count):
         inner, outer, shade = levels[0, i], levels[1, i], levels[2, i]
-        out[2, i], out[3, i], out[4, i] = inner, outer, shade
         if not outer > inner:
             continue
-        level = 0.5 * (inner + outer) + 0.3989422804 * shade * blur
-        centre = int(expected[i] / step)
+        level = 0.5 * (inner + outer) + shade * blur / _ROOT_2PI
         best = -1
-        for away in range(int(reach / step) + 1):
-            for k in (centre + away, centre - away):
-                if k >= 1 and k + 2 < columns and half[i, k] < level <= half[i, k + 1]:
+        for away in range(int(reach / STEP_PX) + 1):
+            for k in (before - 1 - away, before - 1 + away):
+                inside = 1 <= k < columns - 2
+                if inside and strip[i, k] < level <= strip[i, k + 1]:
                     best = k
                     break
             if best >= 0:
                 break
         if best < 0:
             continue
-        a, b = half[i, best - 1], half[i, best]
-        c, d = half[i, best + 1], half[i, best + 2]
-        slope = (0.3 * (d - a) + 0.1 * (c - b)) / step
+        a, b = strip[i, best - 1], strip[i, best]
+        c, d = strip[i, best + 1], strip[i, best + 2]
+        slope = (0.3 * (d - a) + 0.1 * (c - b)) / STEP_PX
         if not slope > 0.0:
             continue
-        mean = 0.25 * (a + b + c + d)
-        place = (best + 0.5) * step + (level - mean) / slope
-        if abs(place - (best + 0.5) * step) > step:
-            place = (best + (level - b) / (c - b)) * step
+        middle = (best - before + 1) * STEP_PX
+        place = middle + (level - 0.25 * (a + b + c + d)) / slope
+        if abs(place - middle) > STEP_PX:
+            place = middle - 0.5 * STEP_PX + (level - b) / (c - b) * STEP_PX
         out[0, i] = place
         out[1, i] = slope

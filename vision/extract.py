@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..core.errors import MagbendError
 from .binarise import Binary, binarise, rebinarise
 from .calibration import Calibration
-from .centreline_fit import Curve
+from .curve import Curve
 from .measurement import Measurement, failure
 from .photo import Photo
 from .quality import doubts, refusal

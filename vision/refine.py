@@ -6,12 +6,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from .centreline_fit import SHARED, Curve, CurveFit, fit_curve
+from .centreline_fit import SHARED, CurveFit, fit_curve
 from .clamp import ClampLines, find_clamp
+from .curve import Curve
 from .edges import Edges, find_edges
 from .joints import find_joints
+from .robust import median
 from .rod import Root
 from .tip import EndFace, find_tip
 from .track import Start
@@ -20,7 +23,12 @@ Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 
 _PASSES = 5
+_ROUGH_PASSES = 2
+"""Passes that only seek the rod, on every other station and with a supple curve."""
 _STILL_PX = 0.1
+_BIN_PX = 4.0
+_BINS = 200
+"""Stations are averaged over bins before the fit: so far, or so many on a long rod."""
 
 ROOT_CLEAR = 0.3
 """Widths next to the clamp that are left out of the fit."""
@@ -49,12 +57,10 @@ class Refined:
     ----------
     fit : CurveFit
         The axis from where the clamp line was taken (s = 0) to the tip's face.
-    edges : Edges
-        Side edges at the stations of the fit.
     shaded : ndarray, shape (n,)
         By how much shade on the paper would have moved the midline, uncorrected, px.
     good : ndarray of bool, shape (n,)
-        Stations whose edges were used.
+        Points of the fit whose edges were used.
     width : ndarray, shape (n,)
         Smoothed width.
     sigma_width : ndarray, shape (n,)
@@ -63,33 +69,38 @@ class Refined:
         The free end; s counts as in `fit`.
     clamp : ClampLines or None
         Lines at the clamp; None for a rod that enters at the border or floats.
-    blur, contrast : float
-        Blur in px and paper minus rod in linear light.
     """
 
     fit: CurveFit
-    edges: Edges
     shaded: Array
     good: NDArray[np.bool_]
     width: Array
     sigma_width: Array
     tip: EndFace
     clamp: ClampLines | None
-    blur: float
-    contrast: float
 
 
 @dataclass(slots=True)
 class _State:
+    """What a pass hands to the next: the curve, half widths along it, and the ends."""
+
     curve: Curve
-    low: Array
-    high: Array
+    half: Array
     width: float
-    blur: float
     first: float
     last: float
+    blur: float = 1.0
     scatter: float = 0.0
-    moved: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """Edges at stations along a curve, and which of them are to be trusted."""
+
+    s: Array
+    theta: Array
+    edges: Edges
+    good: NDArray[np.bool_]
 
 
 def refine(
@@ -121,30 +132,52 @@ def refine(
         If edges or ends cannot be found.
     """
     half = np.full(len(start.curve.s), 0.5 * start.width)
-    state = _State(start.curve, -half, half, start.width, 1.0, 0.0, start.curve.s[-1])
-    result = None
+    state = _State(start.curve, half, start.width, 0.0, float(start.curve.s[-1]))
     for turn in range(_PASSES):
-        length = float(state.curve.s[-1])
-        result = _pass(grey, state, root, sign, joints, turn)
-        still = abs(state.curve.s[-1] - length) + abs(state.moved) < _STILL_PX
-        if turn >= 2 and still:
+        length = state.last
+        result, first = _pass(grey, state, root, sign, joints, turn)
+        still = abs(state.last - length) + abs(first) < _STILL_PX
+        if turn >= _ROUGH_PASSES and still:
             break
-    if result is None:
-        raise LostError("no_rod", "nothing was measured")
     return result
 
 
 def _pass(
     grey: Image, state: _State, root: Root, sign: float,
     joints: Callable[[Curve], Sequence[float]], turn: int,
-) -> Refined:  # fmt: skip
-    curve, width = state.curve, state.width
-    reach = min(0.35 * width, 6.0 + 0.1 * width)
+) -> tuple[Refined, float]:  # fmt: skip
+    """Return what is seen along the curve, and where on it the rod begins."""
+    seen = _look(grey, state, sign, turn)
+    tip, lines, first = _ends(grey, state, seen, root, sign, turn)
+    fit, used = _fit(state, seen, first, tip.s, joints, turn, clamped=root == "clamp")
+    at = fit.curve.s + first
+    smooth, sigma = _smooth_width(seen, at, state.width)
+    shaded = np.interp(at, seen.s, _shaded(seen.edges, state.blur))
+    state.curve, state.half = fit.curve, 0.5 * smooth
+    state.first, state.last = 0.0, float(fit.curve.s[-1])
+    return Refined(
+        fit=fit, shaded=shaded, good=used, width=smooth, sigma_width=sigma,
+        tip=replace(tip, s=tip.s - first),
+        clamp=None if lines is None else _shifted(lines, first),
+    ), first  # fmt: skip
+
+
+def _look(grey: Image, state: _State, sign: float, turn: int) -> _Seen:
+    """Find the edges along the curve; know its width, blur and roughness after."""
+    width = state.width
+    step = 2.0 if turn < _ROUGH_PASSES else 1.0
+    s = np.linspace(0.0, state.curve.s[-1], int(state.curve.s[-1] / step) + 1)
+    points, theta = state.curve.at(s)
+    normals = np.column_stack([-np.sin(theta), np.cos(theta)])
+    half = np.interp(s, state.curve.s, state.half)
+    # At first the edges lie where they are expected to a pixel or two.
+    reach, fuzz = min(0.35 * width, 6.0 + 0.1 * width), min(0.1 * width, 3.0)
     if turn:
-        reach = min(max(3.0, 3.0 * state.blur, 4.0 * state.scatter), 0.45 * width)
+        fuzz = 4.0 * state.scatter
+        reach = min(max(3.0, 3.0 * state.blur, 3.0 * fuzz), 0.45 * width)
     edges = find_edges(
-        grey, curve.points, curve.normals, state.low, state.high,
-        reach=reach, blur=state.blur, sign=sign,
+        grey, points, normals, -half, half,
+        reach=reach, blur=state.blur, fuzz=fuzz, sign=sign, smooth=int(6.0 / step),
     )  # fmt: skip
     good = _usable(edges)
     if good.sum() < max(8.0, 0.4 * len(good)):
@@ -152,60 +185,41 @@ def _pass(
             "edges_lost",
             "less than half of the rod has two edges that can be told from the paper",
         )
-    state.width = float(np.median(edges.width[good]))
+    state.width = median(edges.width[good])
     blur = edges.blur
     state.blur = float(np.clip(blur, 0.3, 0.5 * state.width)) if blur > 0 else 1.0
-    state.scatter = _scatter(edges)
-    tip, lines, first = _ends(grey, state, edges, good, root, sign, turn)
-    fit, used = _fit(
-        state, edges, good, first, tip.s, joints, turn, clamped=root == "clamp"
-    )
-    shift = replace(tip, s=tip.s - first)
-    at = fit.curve.s + first
-    smooth, sigma = _smooth_width(curve.s, edges, good, at, state.width)
-    state.curve, state.first, state.last = fit.curve, 0.0, float(fit.curve.s[-1])
-    state.moved = first
-    state.low, state.high = -0.5 * smooth, 0.5 * smooth
-    kept = _at_stations(edges, curve.s, at)
-    return Refined(
-        fit=fit, edges=kept, shaded=_shaded(kept, state.blur), good=used,
-        width=smooth, sigma_width=sigma, tip=shift,
-        clamp=None if lines is None else _shifted(lines, first),
-        blur=state.blur, contrast=edges.contrast,
-    )  # fmt: skip
+    state.scatter = _scatter(edges, int(5.0 / step))
+    return _Seen(s, theta, edges, good)
 
 
 def _usable(edges: Edges) -> NDArray[np.bool_]:
     """Stations with both edges, of a width like their neighbours'."""
     width = edges.width
-    found = np.isfinite(width)
-    if found.sum() < 8:
-        return found
-    centre = float(np.median(width[found]))
-    spread = 1.4826 * float(np.median(np.abs(width[found] - centre)))
-    return found & (np.abs(width - centre) < max(5.0 * spread, 0.6))
+    centre = median(width)
+    away = np.abs(width - centre)
+    return np.asarray(away < max(5.0 * 1.4826 * median(away), 0.6))
 
 
-def _scatter(edges: Edges) -> float:
-    """Return how much an edge jumps from one station to the next but four, px."""
-    jump = np.concatenate(
-        [edges.low[5:] - edges.low[:-5], edges.high[5:] - edges.high[:-5]]
+def _scatter(edges: Edges, lag: int) -> float:
+    """Return how much an edge jumps from one station to one about 5 px on, px."""
+    low, high = edges.low, edges.high
+    jump = median(
+        np.abs(np.concatenate([low[lag:] - low[:-lag], high[lag:] - high[:-lag]]))
     )
-    jump = jump[np.isfinite(jump)]
-    return 1.05 * float(np.median(np.abs(jump))) if jump.size else 0.0
+    return 1.05 * jump if jump > 0.0 else 0.0
 
 
 def _ends(
-    grey: Image, state: _State, edges: Edges, good: NDArray[np.bool_],
-    root: Root, sign: float, turn: int,
+    grey: Image, state: _State, seen: _Seen, root: Root, sign: float, turn: int
 ) -> tuple[EndFace, ClampLines | None, float]:  # fmt: skip
     curve, width = state.curve, state.width
     outwards = 0.4 * width if turn == 0 else 0.0
     reach = 1.3 * width if turn == 0 else 0.3 * width + 2.0
-    near = good & (curve.s > curve.s[-1] - 3.0 * width)
-    middle = float(np.median(edges.middle[near])) if near.any() and turn == 0 else 0.0
-    end = good & (curve.s > curve.s[-1] - 1.5 * width)
-    taper = float(np.median(edges.width[end])) if end.sum() > 3 else width
+    edges = seen.edges
+    near = seen.good & (seen.s > curve.s[-1] - 3.0 * width)
+    middle = median(edges.middle[near]) if near.any() and turn == 0 else 0.0
+    end = seen.good & (seen.s > curve.s[-1] - 1.5 * width)
+    taper = median(edges.width[end]) if end.sum() > 3 else width
     tip = find_tip(
         grey, curve, expected=state.last + outwards, width=min(width, taper),
         blur=state.blur, reach=reach, middle=middle, sign=sign,
@@ -260,83 +274,103 @@ def _border_crossing(grey: Image, curve: Curve) -> float:
 
 
 def _fit(
-    state: _State, edges: Edges, good: NDArray[np.bool_], first: float, last: float,
+    state: _State, seen: _Seen, first: float, last: float,
     joints: Callable[[Curve], Sequence[float]], turn: int, *, clamped: bool,
 ) -> tuple[CurveFit, NDArray[np.bool_]]:  # fmt: skip
-    curve, width = state.curve, state.width
+    width = state.width
     if last - first < 4.0 * width:
         raise LostError("no_rod", "what looks like a rod is shorter than four widths")
-    count = max(round(last - first), 16)
-    s = np.linspace(first, last, count + 1)
-    points, theta = curve.at(s)
-    offset = np.interp(s, curve.s[good], edges.middle[good])
-    share = np.interp(s, curve.s, good.astype(np.float64), left=0.0, right=0.0)
     clear = max(2.0, 2.5 * state.blur)
     # The corner between clamp and paper is dark: edges there are no edges of the rod.
     root = max(clear, ROOT_CLEAR * width) if clamped else clear
-    used = (share > 0.99) & (s > first + root) & (s < last - clear)
-    if used.sum() < 8:
+    use = seen.good & (seen.s > first + root) & (seen.s < last - clear)
+    if use.sum() < 8:
         raise LostError("edges_lost", "too few edges of the rod are seen")
-    measured = points + np.where(used, offset, 0.0)[:, None] * np.column_stack(
+    count = max(int((last - first) / max(_BIN_PX, (last - first) / _BINS)), 16)
+    s = np.linspace(first, last, count + 1)
+    offset, within, weights = (
+        np.zeros(count + 1),
+        np.zeros(count + 1),
+        np.zeros(count + 1),
+    )
+    _average(seen.s, seen.edges.middle, use, s, offset, within, weights)
+    points, theta = state.curve.at(s)
+    measured = points + offset[:, None] * np.column_stack(
         [-np.sin(theta), np.cos(theta)]
     )
-    weights = _weights(used, width)
     # Supple while the rod is sought, then stiff enough not to follow shade; the path
     # of a rough rod (yarn) is no elastica, and stays supple.
-    supple = turn < 2 or state.scatter > 0.03 * width
-    options = {
-        "spacing": max((1.0 if supple else 1.5) * width, (last - first) / 50.0),
-        "joints": joints(curve),
-        "shared": 3.0 if supple else SHARED,
-    }
-    if not supple and not options["joints"]:
-        options["joints"] = find_joints(
-            s - first, theta, np.where(used, offset, 0.0), weights,
-            width=width, shared=SHARED,
+    supple = turn < _ROUGH_PASSES or state.scatter > 0.03 * width
+    places = joints(state.curve)
+    if not supple and not places:
+        places = find_joints(
+            seen.s - first, seen.theta, np.where(use, seen.edges.middle, 0.0),
+            use.astype(np.float64), width=width, shared=SHARED,
         )  # fmt: skip
-    fit = fit_curve(s - first, measured, weights, theta=theta, **options)  # type: ignore[arg-type]
-    if turn >= 2:
-        outlying = np.abs(np.nan_to_num(fit.residual)) > 4.0 * fit.noise + 1e-3
-        if outlying.any() and (used & ~outlying).sum() > 0.5 * used.sum():
-            used = used & ~outlying
-            weights = _weights(used, width)
-            fit = fit_curve(s - first, measured, weights, theta=theta, **options)  # type: ignore[arg-type]
-    return fit, used
+
+    def fitted(weights: Array) -> CurveFit:
+        return fit_curve(
+            s - first, measured, _held_ends(weights, s, width), theta=theta,
+            spacing=max((1.0 if supple else 1.5) * width, (last - first) / 50.0),
+            joints=places,
+            shared=(3.0 if supple else SHARED) / float(seen.s[1]),
+            within=float(within[weights > 0.0].sum()),
+        )  # fmt: skip
+
+    fit = fitted(weights)
+    if turn >= _ROUGH_PASSES:
+        away = np.abs(np.nan_to_num(fit.residual))
+        outlying = away > 4.0 * np.sqrt(np.mean(away**2)) + 1e-3
+        left = np.where(outlying, 0.0, weights)
+        if outlying.any() and left.sum() > 0.5 * weights.sum():
+            weights = left
+            fit = fitted(weights)
+    return fit, weights > 0.5 * np.median(weights)
 
 
-def _weights(used: NDArray[np.bool_], width: float) -> Array:
-    """Weigh stations: a frayed end keeps a little of the shape it had before."""
-    weights = used.astype(np.float64)
-    seen = np.flatnonzero(used)
-    if len(used) - seen[-1] > 0.6 * width:
-        weights[seen[-1] + 1 :] = 0.03
-    if seen[0] > 0.6 * width:
-        weights[: seen[0]] = 0.03
-    return weights
+@njit(cache=True)
+def _average(
+    s: Array, value: Array, use: NDArray[np.bool_], at: Array,
+    mean: Array, within: Array, count: Array,
+) -> None:  # fmt: skip
+    """Average values over the bins about the points of an even grid.
+
+    `within` becomes the sum of squares about the mean, `count` the number of values.
+    """
+    step = at[1] - at[0]
+    for i in range(s.size):
+        k = int((s[i] - at[0]) / step + 0.5)
+        if use[i] and s[i] >= at[0] and k < at.size:
+            count[k] += 1.0
+            change = value[i] - mean[k]
+            mean[k] += change / count[k]
+            within[k] += change * (value[i] - mean[k])
 
 
-def _smooth_width(
-    s: Array, edges: Edges, good: NDArray[np.bool_], at: Array, typical: float
-) -> tuple[Array, Array]:
+def _held_ends(weights: Array, s: Array, width: float) -> Array:
+    """Return weights by which a frayed end keeps a little of the shape it had."""
+    seen = np.flatnonzero(weights)
+    held = weights.copy()
+    little = 0.03 * weights.max()
+    if s[-1] - s[seen[-1]] > 0.6 * width:
+        held[seen[-1] + 1 :] = little
+    if s[seen[0]] - s[0] > 0.6 * width:
+        held[: seen[0]] = little
+    return held
+
+
+def _smooth_width(seen: _Seen, at: Array, typical: float) -> tuple[Array, Array]:
     """Return the width as a running mean over one rod width, and its deviation."""
-    value = np.where(good, edges.width, 0.0)
-    half = max(2, int(0.5 * typical))
+    s, good, width = seen.s, seen.good, seen.edges.width
+    half = max(2, int(0.5 * typical / s[1]))
     window = np.ones(2 * half + 1)
-    total = np.convolve(value, window, mode="full")[half:-half]
-    count = np.convolve(good.astype(np.float64), window, mode="full")[half:-half]
+    total = np.convolve(np.where(good, width, 0.0), window)[half:-half]
+    count = np.convolve(good.astype(np.float64), window)[half:-half]
     known = count >= 0.3 * len(window)
     mean = np.interp(s, s[known], total[known] / count[known])
-    rest = np.where(good, edges.width - mean, np.nan)
-    scatter = 1.4826 * float(np.nanmedian(np.abs(rest)))
+    scatter = 1.4826 * median(np.abs(width - mean)[good])
     sigma = scatter * np.sqrt(2.0 / np.maximum(count, 1.0))
     return np.interp(at, s, mean), np.interp(at, s, sigma)
-
-
-def _at_stations(edges: Edges, s: Array, at: Array) -> Edges:
-    values = {}
-    for name in Edges.__slots__:
-        values[name] = np.interp(at, s, getattr(edges, name), left=np.nan, right=np.nan)
-    return Edges(**values)
 
 
 def _shaded(edges: Edges, blur: float) -> Array:

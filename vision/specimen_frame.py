@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .calibration import Calibration
-from .centreline_fit import Curve
+from .curve import Curve
 from .measurement import Measurement, Pose
 from .refine import LostError, Refined
 from .rod import Candidate

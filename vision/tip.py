@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from .centreline_fit import Curve
+from .curve import Curve
 from .edges import _bilinear
 
 Array = NDArray[np.float64]

@@ -13,7 +13,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from .centreline_fit import Curve, fit_curve
+from .centreline_fit import fit_curve
+from .curve import Curve
 from .edges import STEP_PX, _bilinear, rough_edges
 
 Array = NDArray[np.float64]

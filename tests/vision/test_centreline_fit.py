@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from magbend.vision.centreline_fit import _bends, _design, _knots, fit_curve
+from magbend.vision.centreline_fit import fit_curve
+from magbend.vision.spline import bends, design, knots_between
 
 
 def arc(length: float, turn: float, step: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
@@ -18,9 +19,9 @@ def arc(length: float, turn: float, step: float = 1.0) -> tuple[np.ndarray, np.n
 
 
 def test_basis_is_that_of_scipy():
-    knots = _knots(0.0, 100.0, 7.0, [30.0, 60.0])
+    knots = knots_between(0.0, 100.0, 7.0, [30.0, 60.0])
     s = np.linspace(0.0, 100.0, 333)
-    basis, slopes = _design(knots, s)
+    basis, slopes = design(knots, s)
     spline = BSpline(knots, np.eye(basis.shape[1]), 3)
     np.testing.assert_allclose(basis, spline(s), atol=1e-13)
     smooth = (np.abs(s - 30.0) > 0.1) & (np.abs(s - 60.0) > 0.1)
@@ -28,13 +29,13 @@ def test_basis_is_that_of_scipy():
 
 
 def test_penalty_is_the_integral_of_the_third_derivative_squared():
-    knots = _knots(0.0, 50.0, 5.0, [])
+    knots = knots_between(0.0, 50.0, 5.0, [])
     rng = np.random.default_rng(1)
     c = rng.normal(size=len(knots) - 4)
     middle = 0.5 * (knots[3:-4] + knots[4:-3])
     third = BSpline(knots, c, 3)(middle, nu=3)
     exact = np.sum(third**2 * np.diff(knots[3:-3]))
-    assert np.sum((_bends(knots) @ c) ** 2) == pytest.approx(exact, rel=1e-9)
+    assert np.sum((bends(knots) @ c) ** 2) == pytest.approx(exact, rel=1e-9)
 
 
 @settings(max_examples=20, deadline=None)

@@ -5,7 +5,7 @@ import pytest
 from scipy.special import erf
 
 from magbend.vision.binarise import binarise
-from magbend.vision.edges import find_edges, rough_edges, sample
+from magbend.vision.edges import _bilinear, find_edges, rough_edges
 
 
 def bar(
@@ -46,7 +46,7 @@ def test_shade_on_one_side_does_not_pull_the_midline():
     edges = find_edges(image, points, normals, -expected, expected, reach=3, blur=1.0)
     level = 0.05 + 0.5 * 0.75
     plain = np.mean(
-        [np.interp(level, sample(image, p[0] + t * n[0], p[1] + t * n[1]), t)
+        [np.interp(level, [_bilinear(image, *(p + u * n)) for u in t], t)
          for p, n in zip(points, normals, strict=True)
          for t in [np.linspace(5.0, 14.0, 91)]]
     )  # fmt: skip
@@ -76,11 +76,9 @@ def test_no_edge_is_nan_not_a_number():
 
 def test_outside_the_picture_is_nan():
     image = np.ones((20, 30), np.float32)
-    light = sample(
-        image, np.array([-0.1, 29.1, 3.0, 3.0]), np.array([3.0, 3.0, 19.1, 3.0])
-    )
-    assert np.isnan(light[:3]).all()
-    assert light[3] == 1.0
+    for x, y in ((-0.1, 3.0), (29.1, 3.0), (3.0, 19.1), (3.0, -0.1)):
+        assert np.isnan(_bilinear(image, x, y))
+    assert _bilinear(image, 3.0, 3.0) == 1.0
 
 
 def test_rough_edges_see_through_a_shadow():
