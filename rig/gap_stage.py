@@ -15,6 +15,7 @@ from typing import Literal
 from ..core.checks import finite
 from ..core.progress import Progress, silent
 from .clock import Clock
+from .interlock import check_feed, check_gap, check_homing, check_range
 from .stage import (
     InterlockError,
     Moved,
@@ -122,10 +123,16 @@ class GapStage:
         ------
         StageError
             If nobody answers, a setting does not fit the rig file (named in the
-            sentence), or the stage could not stop before it touches.
+            sentence), the stage could not stop before it touches, or no gap of the
+            limits lies within its travel.
         """
         self._stage.connect()
-        self._require_room_to_stop(self._config.feed_mm_min)
+        try:
+            check_feed(self._config.feed_mm_min, self._bounds, self._stage.limits)
+            check_range(self.range_mm())
+        except InterlockError:
+            self._stage.close()
+            raise
         self._from_far_side = False
 
     def home(self) -> None:
@@ -141,14 +148,7 @@ class GapStage:
         """
         switch_mm = self._stage.limits.switch_mm
         if switch_mm is not None:
-            gap_mm = self.to_gap_mm(switch_mm)
-            if gap_mm < self._bounds.min_gap_mm:
-                raise InterlockError(
-                    f"homing would drive the stage to a gap of {gap_mm:g} mm, nearer "
-                    f"than min_gap_mm = {self._bounds.min_gap_mm:g} mm; home away from "
-                    "the magnet ($23 on GRBL), or correct gap_at_zero_mm and direction "
-                    "in the rig file; nothing was sent"
-                )
+            check_homing(self.to_gap_mm(switch_mm), self._bounds)
         self._from_far_side = False
         self._stage.home()
 
@@ -199,25 +199,8 @@ class GapStage:
             If it is nearer than `min_gap_mm`, beyond `max_gap_mm`, or outside the
             travel of the controller.
         """
-        finite(gap_mm, "gap_mm", "mm")
-        bounds = self._bounds
-        if gap_mm < bounds.min_gap_mm:
-            raise InterlockError(
-                f"gap_mm must be at least {bounds.min_gap_mm:g} mm (limits.min_gap_mm "
-                f"of the rig file); instead received {gap_mm:g} mm; nothing was sent"
-            )
-        if gap_mm > bounds.max_gap_mm:
-            raise InterlockError(
-                f"gap_mm must be at most {bounds.max_gap_mm:g} mm (limits.max_gap_mm "
-                f"of the rig file); instead received {gap_mm:g} mm; nothing was sent"
-            )
-        low, high = self.range_mm()
         slack_mm = self._stage.limits.step_mm / 2.0
-        if not low - slack_mm <= gap_mm <= high + slack_mm:
-            raise InterlockError(
-                f"gap_mm must be from {low:g} to {high:g} mm, which is the travel of "
-                f"the controller; instead received {gap_mm:g} mm; nothing was sent"
-            )
+        check_gap(gap_mm, self._bounds, self.range_mm(), slack_mm)
 
     def goto_gap(
         self,
@@ -251,7 +234,7 @@ class GapStage:
         """
         self.check_gap(gap_mm)
         feed = self._config.feed_mm_min if feed_mm_min is None else feed_mm_min
-        self._require_room_to_stop(feed)
+        check_feed(feed, self._bounds, self._stage.limits)
         self._require_homed()
         here = self._here_mm()
         legs, approach = self._legs(here, gap_mm)
@@ -391,21 +374,4 @@ class GapStage:
             raise PositionLostError(
                 f"the position of the stage is {state}; home it first "
                 "(magbend rig home), then move"
-            )
-
-    def _require_room_to_stop(self, feed_mm_min: float) -> None:
-        limits, bounds = self._stage.limits, self._bounds
-        finite(feed_mm_min, "feed_mm_min", "mm/min")
-        if not 0.0 < feed_mm_min <= limits.max_feed_mm_min:
-            raise InterlockError(
-                f"feed_mm_min must be above zero and at most the controller's "
-                f"{limits.max_feed_mm_min:g} mm/min; instead received {feed_mm_min:g}"
-            )
-        room_mm = bounds.min_gap_mm - bounds.contact_gap_mm
-        needed_mm = limits.stopping_mm(feed_mm_min)
-        if needed_mm > room_mm:
-            raise InterlockError(
-                f"at {feed_mm_min:g} mm/min the stage needs {needed_mm:.2f} mm to "
-                f"stop, but min_gap_mm is only {room_mm:g} mm before contact_gap_mm; "
-                "lower feed_mm_min or raise min_gap_mm"
             )

@@ -51,7 +51,9 @@ class GrblStage(SerialStage[GrblSession]):
         )
         found = connect_board(session, self._clock, config)
         problem = grbl_audit.audit(found.settings, config)
-        problem = problem or grbl_audit.audit_build(found.details, config)
+        problem = problem or grbl_audit.audit_build(
+            found.settings, found.details, config
+        )
         if problem:
             raise StageError(f"the stage on {link.port} does not fit: {problem}")
         self._take_in(session, found, link.port)
@@ -59,20 +61,21 @@ class GrblStage(SerialStage[GrblSession]):
 
     def _take_in(self, session: GrblSession, found: FoundBoard, port: str) -> None:
         """Keep what the board said; believe its position if nobody disturbed it."""
-        self._limits = grbl_audit.limits_of(found.settings, self._config)
+        config = self._config
+        self._limits = grbl_audit.limits_of(found.settings, found.details, config)
         self._identity = StageIdentity(
             driver="grbl",
             firmware=found.banner,
             port=port,
             details=found.details,
             settings=found.settings,
-            notes=tuple(grbl_audit.notes(found.settings)),
+            notes=tuple(grbl_audit.notes(found.settings, config)),
         )
         self._trust.watch(session)
         self._undisturbed = found.undisturbed
         left_at = self._presence.recall() if self._presence else None
         where = left_at if found.undisturbed else None
-        if where and self._trust.is_at(session, where, self._limits.step_mm):
+        if where and self._trust.is_at(session, where, self._limits.tolerance_mm):
             self._trust.confirm(session)
 
     def home(self) -> None:
@@ -117,14 +120,21 @@ class GrblStage(SerialStage[GrblSession]):
         report = self._wait_for_report(self._require_session())
         here = self._machine_mm()
         if report.state != "idle" or here is None:
-            raise StageError(f"the stage must be idle; it is in {report.state}")
+            way_out = (
+                "home it, or magbend rig unlock"
+                if report.state == "alarm"
+                else ("wait for it, or stop it first (magbend rig stop)")
+            )
+            raise StageError(
+                f"the stage must be idle; it is in {report.state}: {way_out}"
+            )
         return here
 
     def _ready_mm(self) -> float:
         session = self._require_session()
         self._make_ready(session)
         require_unlocked(session)
-        self._trust.require(session, self.limits.step_mm)
+        self._trust.require(session, self.limits.tolerance_mm)
         require_open_switch(session, self._config.axis)
         here = self._machine_mm()
         if here is None:
@@ -176,8 +186,8 @@ class GrblStage(SerialStage[GrblSession]):
                 reset_standing(session, self._trust)
             self._trust.stands(session)
             return
-        if not session.deaf:
-            self._trust.doubt()
+        self._trust.doubt()
+        note(session, self._trust)
         session.reset()
         raise StageTimeoutError(
             "the stage did not come to a stop that it could report; it was reset; "
@@ -293,8 +303,9 @@ class GrblStage(SerialStage[GrblSession]):
         distance = 0.0 if start is None else target_mm - start
         return Target(
             axis=self._axis,
+            start_mm=target_mm - distance,
             machine_mm=target_mm,
-            tolerance_mm=1.01 * self.limits.step_mm,
+            tolerance_mm=self.limits.tolerance_mm,
             limit_s=self._limit_s(distance, feed_mm_min),
         )
 

@@ -11,6 +11,7 @@ from .stage_config import StageConfig
 Settings = Mapping[str, str]
 
 _AXES = "XYZ"
+_MAX_STEPS_HZ = 30_000.0
 
 
 def number(settings: Settings, name: str) -> float | None:
@@ -50,16 +51,30 @@ def audit(settings: Settings, config: StageConfig) -> str | None:
     return _audit_flags(settings, config)
 
 
-def audit_build(details: Sequence[str], config: StageConfig) -> str | None:
+def _options(details: Sequence[str]) -> str:
+    """Return the letters of ``[OPT:``."""
+    options = next((d for d in details if d.startswith("OPT:")), "OPT:")
+    return options[4:].split(",")[0]
+
+
+def _homing_bits(settings: Settings) -> int:
+    """Return ``$22``: 0 or 1 on GRBL; grblHAL adds 2, single axes, and 8, origin 0."""
+    return int(number(settings, "22") or 0)
+
+
+def audit_build(
+    settings: Settings, details: Sequence[str], config: StageConfig
+) -> str | None:
     """Return why the firmware's build cannot do what the rig file asks, or None.
 
     A stock GRBL that receives ``$HX`` answers ``error:3`` and stays stuck in Home.
     """
-    options = next((d for d in details if d.startswith("OPT:")), "OPT:")
-    if config.home_command != "$H" and "H" not in options[4:].split(",")[0]:
+    options = _options(details)
+    single = "H" in options or _homing_bits(settings) & 2
+    if config.home_command != "$H" and not single:
         return (
-            f"stage.home_command is {config.home_command}, but [{options}] says that "
-            "this build has no single-axis homing; use $H, or a build that has it"
+            f"stage.home_command is {config.home_command}, but [OPT:{options}] says "
+            "that this build has no single-axis homing; use $H, or a build that has it"
         )
     return None
 
@@ -90,8 +105,7 @@ def _audit_flags(settings: Settings, config: StageConfig) -> str | None:
             f"$11{_AXES.index(config.axis)} (max. rate of {config.axis}) is {feed:g} "
             f"mm/min, below stage.feed_mm_min = {config.feed_mm_min:g} of the rig file"
         )
-    homing = number(settings, "22")
-    if config.homing == "switches" and not (homing and int(homing) & 1):
+    if config.homing == "switches" and not _homing_bits(settings) & 1:
         return (
             "$22 (homing) is off, so the stage cannot find its position: type $22=1 on "
             "the board's console (limit switches on every axis of a stock build), or "
@@ -100,7 +114,7 @@ def _audit_flags(settings: Settings, config: StageConfig) -> str | None:
     return None
 
 
-def notes(settings: Settings) -> list[str]:
+def notes(settings: Settings, config: StageConfig) -> list[str]:
     """Return what the board allows but a bench should not: sentences for people."""
     found = []
     if number(settings, "1") != 255:
@@ -112,28 +126,48 @@ def notes(settings: Settings) -> list[str]:
         found.append("$20 (soft limits) is off; limits are checked by the host alone")
     if not number(settings, "21"):
         found.append("$21 (hard limits) is off; the switches stop nothing but homing")
+    steps = number(settings, f"{100 + _AXES.index(config.axis)}") or 0.0
+    rate_Hz = steps * config.feed_mm_min / 60.0
+    if rate_Hz > _MAX_STEPS_HZ:
+        found.append(
+            f"feed_mm_min = {config.feed_mm_min:g} makes {rate_Hz:.0f} steps/s; an "
+            f"8-bit board fails above {_MAX_STEPS_HZ:.0f} (ALARM:3, lost steps)"
+        )
     return found
 
 
-def limits_of(settings: Settings, config: StageConfig) -> StageLimits:
+def limits_of(
+    settings: Settings, details: Sequence[str], config: StageConfig
+) -> StageLimits:
     """Return step, ceilings and travel of the axis, after the audit passed.
 
-    A GRBL that homes by switches counts from 0 at the switches into the negative:
-    its travel is from -$130 to 0.
+    A GRBL that homes by switches counts from 0 at the upper switches into the negative,
+    whichever side it homes to; one built (``Z`` in ``[OPT:``) or set to call the homed
+    place 0 counts from there. The last millimetres before the switch, over which homing
+    pulls off, are left alone: a switch that closes there is an alarm.
     """
     index = _AXES.index(config.axis)
     steps, feed, acceleration, travel = (
         number(settings, f"{base + index}") or math.nan for base in (100, 110, 120, 130)
     )
-    homed_by_switches = config.homing == "switches"
+    pull_off = number(settings, "27") or 0.0
     downward = int(number(settings, "23") or 0) >> index & 1
+    origin_zero = "Z" in _options(details) or _homing_bits(settings) & 8
+    homed = 0.0 if origin_zero else pull_off - travel if downward else -pull_off
+    away = travel - pull_off
+    switch, far = (-pull_off, away) if downward else (pull_off, -away)
+    by_switches = config.homing == "switches"
     return StageLimits(
         step_mm=1.0 / steps,
         max_feed_mm_min=feed,
         acceleration_mm_s2=acceleration,
-        travel_mm=(-travel, 0.0) if homed_by_switches else None,
-        switch_mm=(-travel if downward else 0.0) if homed_by_switches else None,
+        travel_mm=_span(homed, homed + far) if by_switches else None,
+        switch_mm=homed + switch if by_switches else None,
     )
+
+
+def _span(one: float, other: float) -> tuple[float, float]:
+    return (one, other) if one < other else (other, one)
 
 
 def homing_time_s(settings: Settings) -> float:

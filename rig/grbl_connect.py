@@ -12,6 +12,7 @@ from .grbl_session import CommandRefusedError, GrblSession
 from .stage import StageTimeoutError
 from .stage_config import StageConfig
 
+_RESET_TRIES = 3
 _MOVING_STATES = ("run", "jog")
 
 
@@ -55,6 +56,7 @@ def connect_board(
         report = _wait_for_stand(session, clock, config)
     if config.reset_on_connect or report is None or report.state != "idle":
         _reset(session, config)
+    _refuse_open_door(session)
     restarts = session.restarts
     details = _ask_details(session)
     settings = {
@@ -64,9 +66,14 @@ def connect_board(
     }
     if not settings:
         raise StageError("the board answers, but reports no settings to $$")
-    session.ask(config.answer_timeout_s)
+    report = session.ask_place(config.answer_timeout_s)
     if session.restarts != restarts:
         raise StageError("the board restarts again and again; look at its power supply")
+    if report is None:
+        raise StageError(
+            f"the board ({session.banner or 'no banner'}) answers, but sends no status "
+            "report as GRBL 1.1 does; older versions cannot jog ($J=): update it"
+        )
     version = next((d for d in details if d.startswith("VER:")), "unknown firmware")
     return FoundBoard(
         banner=session.banner or version,
@@ -112,8 +119,16 @@ def _wait_for_stand(
     return report
 
 
+def _refuse_open_door(session: GrblSession) -> None:
+    if session.report is not None and session.report.state == "door":
+        raise StageError(
+            "the board is in Door: its safety door input is open, and it takes no line "
+            "until that closes; close it, or tie the input off, then connect again"
+        )
+
+
 def _reset(session: GrblSession, config: StageConfig) -> None:
-    if not session.reset():
+    if not session.reset(tries=_RESET_TRIES):
         raise StageTimeoutError(
             "nobody answers as GRBL does: look at the cable, the power, the port and "
             f"stage.baud (now {config.baud})"

@@ -10,12 +10,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from .clock import Clock
-from .grbl_protocol import Alarm, Ok, Refusal, Report
+from .grbl_protocol import Alarm, Ok, Refusal, Report, Triple
 from .grbl_session import CommandRefusedError, GrblSession
 from .stage import Moved, StageTimeoutError
 
 POLL_S = 0.1
 _STALL_S = 1.5
+_ASTRAY_MM = 0.2
 _SILENCE_S = 8.0
 _STANDING = ("idle", "alarm", "check", "sleep")
 
@@ -29,12 +30,19 @@ def stands(report: Report) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Target:
-    """Where a motion ends: axis number, machine position, tolerance, time allowed."""
+    """From where to where an axis moves, how exactly, and how long it may take."""
 
     axis: int
+    start_mm: float
     machine_mm: float
     tolerance_mm: float
     limit_s: float
+
+    def is_astray(self, here_mm: float) -> bool:
+        """Return whether a place is not on the way: a digit of the line was lost."""
+        low, high = sorted((self.start_mm, self.machine_mm))
+        slack = self.tolerance_mm + _ASTRAY_MM
+        return not low - slack <= here_mm <= high + slack
 
 
 def await_arrival(
@@ -64,7 +72,7 @@ def await_arrival(
     PositionLostError
         It restarted.
     StageTimeoutError
-        It stopped short, fell silent, or took longer than it may.
+        It stopped short, went elsewhere, fell silent, or took longer than it may.
     """
     start_s = heard_s = progress_s = clock.monotonic_s()
     last: float | None = None
@@ -84,7 +92,7 @@ def await_arrival(
                 return
             if last is None or abs(here - last) > target.tolerance_mm:
                 last, progress_s = here, now_s
-            _raise_if_ended_short(report, here, target, now_s - progress_s)
+            _raise_if_amiss(report, here, target, now_s - progress_s)
         if now_s - heard_s > _SILENCE_S:
             raise StageTimeoutError(f"the stage fell silent for {_SILENCE_S:.0f} s")
         if now_s - start_s > target.limit_s:
@@ -96,9 +104,14 @@ def await_arrival(
         clock.sleep(POLL_S)
 
 
-def _raise_if_ended_short(
+def _raise_if_amiss(
     report: Report, here_mm: float, target: Target, still_s: float
 ) -> None:
+    if target.is_astray(here_mm):
+        raise StageTimeoutError(
+            f"the stage is at {here_mm:.3f} mm, which is not on its way from "
+            f"{target.start_mm:.3f} to {target.machine_mm:.3f} mm"
+        )
     if report.state == "idle" and still_s > _STALL_S:
         raise StageTimeoutError(
             f"the stage stopped at {here_mm:.3f} mm instead of "
@@ -109,16 +122,26 @@ def _raise_if_ended_short(
 
 
 def await_stand(session: GrblSession, clock: Clock, limit_s: float) -> Report | None:
-    """Return the report of a board that stands, or None if it does not say so."""
+    """Return the report of a board that stands, or None if it does not say so.
+
+    It must say so twice: the first answer may be a late one, from before.
+    """
     deadline_s = clock.monotonic_s() + limit_s
+    before: Report | None = None
     while clock.monotonic_s() < deadline_s:
         report = session.ask()
         if session.deaf:
             return None
         if report and stands(report):
-            return report
+            if before and _place(before) == _place(report):
+                return report
+            before = report
         clock.sleep(POLL_S)
     return None
+
+
+def _place(report: Report) -> Triple | None:
+    return report.machine or report.work
 
 
 def await_homing(

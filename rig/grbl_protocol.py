@@ -77,7 +77,8 @@ ALARMS: dict[int, AlarmText] = {
     ),
     9: AlarmText(
         meaning="no limit switch was found within 1.5 x the travel",
-        remedy="check switch, cable and $23, then home (magbend rig home)",
+        remedy="check switch, cable and $23 (a stock build homes Z, then X and Y: "
+        "each needs its switch), then home (magbend rig home)",
     ),
     10: AlarmText(meaning="the second motor of a dual axis did not home", remedy=_HOME),
 }
@@ -184,7 +185,7 @@ _STATES = {
     "idle", "run", "hold", "jog", "alarm", "home", "check", "door", "sleep",
 }  # fmt: skip
 _BANNER = re.compile(r"^(Grbl|GrblHAL)\s+\S+\s+\[")
-_SETTING = re.compile(r"^\$([A-Za-z0-9/_\-]+)=(.*)$")
+_SETTING = re.compile(r"^\$([A-Za-z0-9/_\-]+)=(.*?)(?:\s+\(.*\))?$")  # comment
 _MESSAGE = re.compile(r"^\[([A-Z0-9 +]+):(.*)\]$")
 
 

@@ -30,7 +30,7 @@ def wait_for_report(
         If it does not answer a reset either.
     """
     for _ in range(3):
-        report = session.ask(timeout_s)
+        report = session.ask_place(timeout_s)
         if report is not None:
             return report
         if session.deaf:

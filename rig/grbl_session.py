@@ -35,6 +35,7 @@ logger = logging.getLogger(__name__)
 _RESET_TRIES = 8
 _BANNER_S = 2.5
 _PATIENCE = 10.0
+_OFFSET_EVERY = 30
 _DEAF_ALARMS = (1, 2)
 
 
@@ -171,12 +172,30 @@ class GrblSession:
             if line is None or isinstance(line, (Report, Alarm, Banner)):
                 return line if isinstance(line, Report) else None
 
-    def reset(self) -> bool:
+    def ask_place(self, timeout_s: float) -> Report | None:
+        """Ask until the machine position is known.
+
+        A board that reports WPos tells its offset in some reports only: every tenth at
+        rest, every thirtieth in motion.
+        """
+        report = self.ask(timeout_s)
+        for _ in range(_OFFSET_EVERY):
+            if report is None or self.machine() is not None:
+                break
+            report = self.ask(timeout_s)
+        return report
+
+    def reset(self, *, tries: int = _RESET_TRIES) -> bool:
         """Soft-reset until the banner comes; replies count anew from there.
 
         In Idle, Hold:0 and Alarm the board keeps its position. A reset in the half
         second after ALARM:1 or 2 is swallowed, so it is repeated, at once when the
         board asks for it.
+
+        Parameters
+        ----------
+        tries : int
+            How often it is sent at most.
 
         Returns
         -------
@@ -185,7 +204,7 @@ class GrblSession:
         """
         self._reset_pending = True
         try:
-            return any(self._reset_once() for _ in range(_RESET_TRIES))
+            return any(self._reset_once() for _ in range(tries))
         finally:
             self._reset_pending = False
 

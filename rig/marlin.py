@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 from ..core.errors import StageError
 from .link import Link
-from .marlin_session import MarlinSession, MarlinSetup, read_setup
+from .marlin_session import LineRefusedError, MarlinSession, MarlinSetup, read_setup
 from .serial_stage import MARGIN_S, SerialStage
 from .stage import (
     LinkLostError,
@@ -89,7 +89,7 @@ class MarlinStage(SerialStage[MarlinSession]):
         session = self._require_session()
         here = self._known_mm()
         self._note(session)
-        self._trust.require(session, self.limits.step_mm)
+        self._trust.require(session, self.limits.tolerance_mm)
         return here
 
     def status(self) -> StageStatus:
@@ -199,7 +199,10 @@ def _question(session: MarlinSession, boot_s: float) -> tuple[str, list[str]]:
     firmware = next((text for text in lines if "FIRMWARE_NAME" in text), "")
     if not firmware:
         raise StageError("the board answers, but not with Marlin's FIRMWARE_NAME")
-    return firmware, session.command("M503") + session.command("M211")
+    settings = session.command("M503")
+    with contextlib.suppress(LineRefusedError):  # a build without soft end stops
+        settings += session.command("M211")
+    return firmware, settings
 
 
 def _audit(setup: MarlinSetup, config: StageConfig) -> str | None:

@@ -28,6 +28,10 @@ def nothing() -> None:
     """Check nothing while waiting."""
 
 
+class LineRefusedError(StageError):
+    """The board does not know the line, or will not carry it out."""
+
+
 class MarlinSession:
     """Talk to one board over an open link.
 
@@ -87,21 +91,26 @@ class MarlinSession:
         ------
         PositionLostError
             The board restarted or was halted.
-        StageError
+        LineRefusedError
             It refused the line.
         StageTimeoutError
             It did not answer.
         """
+        self.drain()
+        if self.halted:
+            raise PositionLostError(
+                "the board was halted; restart it (reset button or power), then home "
+                "it (magbend rig home)"
+            )
         limit_s = self._answer_timeout_s if timeout_s is None else timeout_s
         patience = _PATIENCE if timeout_s is None else 1.0
         if not self._in_step:
             mark = f"magbend {next(self._marks)}"
             self._exchange(f"M118 {mark}", limit_s, patience, check, mark)
-        self.drain()
         lines = self._exchange(line, limit_s, patience, check)
         refused = [t for t in lines if t.startswith("Error:") or "Unknown command" in t]
         if refused:
-            raise StageError(f"the stage refused {line!r}: {refused[0]}")
+            raise LineRefusedError(f"the stage refused {line!r}: {refused[0]}")
         return lines
 
     def interrupt(self, line: str) -> None:

@@ -70,15 +70,14 @@ class PositionTrust:
             self._restarts = session.restarts
             self.lose()
 
-    def is_at(self, session: Counting, place: Place, step_mm: float) -> bool:
+    def is_at(self, session: Counting, place: Place, slack_mm: float) -> bool:
         """Return whether the board counts this place on all axes."""
         now = session.machine()
         if now is None or len(now) != len(place):
             return False
-        slack = 1.5 * step_mm
-        return all(abs(a - b) <= slack for a, b in zip(now, place, strict=True))
+        return all(abs(a - b) <= slack_mm for a, b in zip(now, place, strict=True))
 
-    def require(self, session: Counting, step_mm: float) -> None:
+    def require(self, session: Counting, slack_mm: float) -> None:
         """Refuse motion unless the board is homed and where it was left.
 
         Raises
@@ -87,7 +86,7 @@ class PositionTrust:
             If the position is not known, or the board moved or restarted unseen.
         """
         stood = self._stood_at
-        if self.state == "homed" and stood and not self.is_at(session, stood, step_mm):
+        if self.state == "homed" and stood and not self.is_at(session, stood, slack_mm):
             self.lose()
             raise PositionLostError(
                 f"the board counts {session.machine()} mm where it had stood at "

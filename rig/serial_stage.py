@@ -224,7 +224,7 @@ class SerialStage(ABC, Generic[Session]):
             homed by them.
         """
         here = self._standing_mm()
-        if abs(here - machine_mm) > self.limits.step_mm:
+        if abs(here - machine_mm) > self.limits.tolerance_mm:
             raise StageError(
                 f"the board counts {here:.3f} mm, not {machine_mm:.3f} mm: it moved"
             )

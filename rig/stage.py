@@ -128,6 +128,11 @@ class StageLimits:
     travel_mm: tuple[float, float] | None = None
     switch_mm: float | None = None
 
+    @property
+    def tolerance_mm(self) -> float:
+        """How far a report may be from its target: a step, and the last digits."""
+        return 1.01 * self.step_mm + 0.002
+
     def stopping_mm(self, feed_mm_min: float) -> float:
         """Return the distance from a feed hold to standstill, v^2 / (2 a), in mm."""
         speed_mm_s = min(feed_mm_min, self.max_feed_mm_min) / 60.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
+from dataclasses import dataclass
 
 import pytest
 
@@ -16,6 +17,8 @@ from magbend.rig.stage import LinkLostError
 from magbend.rig.virtual.grbl_board import GrblBoard
 from magbend.rig.virtual.protocol_twin import register_board
 from magbend.rig.virtual.pty_server import PtyBoard
+
+from .stage_bench import make_bench
 
 posix = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
 
@@ -159,3 +162,100 @@ def test_ports_are_named_as_they_are_or_by_what_is_plugged_in():
     assert resolve_port("twin://x") == "twin://x"
     with pytest.raises(StageError, match="no port with serial:NOSUCH"):
         resolve_port("serial:NOSUCH")
+
+
+@pytest.mark.parametrize(
+    ("error", "sentence"),
+    [
+        (
+            "[Errno 13] could not open port /dev/ttyUSB0: [Errno 13] Permission "
+            "denied: '/dev/ttyUSB0'",
+            "may not be opened by this user.*group dialout",
+        ),
+        (
+            "could not open port 'COM3': PermissionError(13, 'Access is denied.', "
+            "None, 5)",
+            "in use by another program",
+        ),
+        ("[Errno 16] Resource busy: '/dev/cu.usbserial'", "in use by another program"),
+        (
+            "[Errno 11] Could not exclusively lock port /dev/ttyUSB0: [Errno 11] "
+            "Resource temporarily unavailable",
+            "in use by another program",
+        ),
+        (
+            "could not open port 'COM9': FileNotFoundError(2, 'The system cannot find "
+            "the file specified.', None, 2)",
+            "cannot be opened.*magbend rig ports",
+        ),
+    ],
+    ids=["Linux group", "Windows busy", "macOS busy", "Linux busy", "missing"],
+)
+def test_why_a_port_does_not_open_is_said_with_the_way_out(
+    error, sentence, monkeypatch
+):
+    import serial
+
+    def refuse(*_, **__):
+        raise serial.SerialException(error)
+
+    monkeypatch.setattr(serial, "serial_for_url", refuse)
+    with pytest.raises(StageError, match=sentence):
+        Link("/dev/ttyUSB0", baud=250_000, clock=SteppedClock()).open()
+
+
+def test_a_baud_that_the_system_cannot_set_is_said(monkeypatch):
+    import serial
+
+    def refuse(*_, **__):
+        raise ValueError("Failed to set custom baud rate (123456): [Errno 22]")
+
+    monkeypatch.setattr(serial, "serial_for_url", refuse)
+    with pytest.raises(StageError, match="custom baud rate"):
+        Link("/dev/ttyUSB0", baud=123_456, clock=SteppedClock()).open()
+
+
+@dataclass
+class _UsbPort:
+    device: str
+    serial_number: str = "A50285BI"
+    description: str = "USB serial"
+    vid: int = 0x0403
+    pid: int = 0x6001
+
+
+def test_a_board_is_found_again_under_another_name_by_its_serial_number(monkeypatch):
+    from serial.tools import list_ports
+
+    seen: list[_UsbPort] = []
+    monkeypatch.setattr(list_ports, "comports", lambda: seen)
+    bench = make_bench(port="serial:A50285BI")
+    first = register_board("ttyACM0", bench.board, bench.clock)
+    seen[:] = [_UsbPort(first), _UsbPort("/dev/ttyS7", serial_number="other")]
+    bench.stage.connect()
+    bench.stage.home()
+    bench.board.plugged = False
+    with pytest.raises(LinkLostError):
+        bench.stage.goto_gap(60.0)
+    seen[:] = []
+    with pytest.raises(StageError, match="no port with serial:A50285BI"):
+        bench.stage.recover()
+    bench.board.plugged = True
+    seen[:] = [_UsbPort(register_board("ttyACM1", bench.board, bench.clock))]
+    bench.stage.recover()
+    assert bench.stage.identity.port == "twin://ttyACM1"
+    assert bench.stage.position_state == "unverified"
+
+
+def test_auto_takes_the_only_usb_port_and_names_them_if_there_are_more(monkeypatch):
+    from serial.tools import list_ports
+
+    ports = [_UsbPort("/dev/ttyACM0"), _UsbPort("/dev/ttyS0", vid=0)]
+    monkeypatch.setattr(list_ports, "comports", lambda: ports)
+    assert resolve_port("auto") == "/dev/ttyACM0"
+    ports.append(_UsbPort("/dev/ttyACM1"))
+    with pytest.raises(StageError, match=r"ttyACM0, /dev/ttyACM1.*name one"):
+        resolve_port("auto")
+    ports.clear()
+    with pytest.raises(StageError, match="no USB serial port"):
+        resolve_port("auto")

@@ -7,13 +7,14 @@ import re
 import pytest
 
 from magbend.core.errors import StageError
-from magbend.rig.clock import SteppedClock
 from magbend.rig.gap_stage import GapStage
 from magbend.rig.marlin import MarlinStage
 from magbend.rig.marlin_session import read_position, read_setup
 from magbend.rig.stage import PositionLostError, StageTimeoutError, StoppedError
 from magbend.rig.stage_config import LimitsConfig, StageConfig
 from magbend.rig.virtual.protocol_twin import register_board
+
+from .stage_bench import InterruptingClock, interrupt
 
 M503 = """echo:  G21    ; Units in mm (mm)
 echo:; Steps per unit:
@@ -29,12 +30,12 @@ class MarlinBoard:
     """What `twin://` asks of a board; lines in, lines out, moves that take time."""
 
     def __init__(self) -> None:
-        self.now_s = self._free_s = 0.0
+        self.now_s = self._free_s = self._last_s = 0.0
         self.plugged, self.port_taken, self.restart_on_open = True, False, False
         self._line = b""
         self._out: list[tuple[float, bytes]] = []
         self.x_mm = 37.0
-        self.homed = self.silent = self.short = False
+        self.homed = self.silent = self.short = self.old = False
         self.seen: list[str] = []
         self.say("start\necho:Marlin 2.1.2.4", 0.5)
 
@@ -59,12 +60,13 @@ class MarlinBoard:
                 self._answer(line.decode())
 
     def _answer(self, line: str) -> None:
-        now = self.now_s + 0.01
+        # One line at a time: an answer never overtakes the one before.
+        now = self._last_s = max(self.now_s + 0.01, self._last_s)
         if line == "M115":
             self.say("FIRMWARE_NAME:Marlin 2.1.2.4 MACHINE_TYPE:Stage", now)
         elif line == "M503":
             self.say(M503, now)
-        elif line == "M211":
+        elif line == "M211" and not self.old:
             self.say(M211, now)
         elif line.startswith("G28"):
             self.x_mm, self.homed = 0.0, True
@@ -76,20 +78,25 @@ class MarlinBoard:
             distance = float(match[1]) - self.x_mm
             self._free_s = now + abs(distance) / (float(match[2]) / 60.0)
             self.x_mm += distance * (0.5 if self.short else 1.0)
-        elif line.startswith("M118"):
+        elif line.startswith("M118") and not self.old:
             self.say(line[5:], now)
+        elif line.startswith(("M118", "M211")):
+            self.say(f'echo:Unknown command: "{line}"', now)
         elif line == "M400":
             now = max(now, self._free_s)
+        elif line == "M410":
+            self._free_s = now
         elif line == "M114":
             steps = round(self.x_mm * 80)
             self.say(f"X:{self.x_mm:.2f} Y:0.00 Z:0.00 E:0.00 Count X:{steps} Y:0", now)
         self.say("ok", now)
+        self._last_s = now
 
 
 @pytest.fixture
 def bench(tmp_path, monkeypatch):
     monkeypatch.setenv("MAGBEND_RUNTIME_DIR", str(tmp_path))
-    clock, board = SteppedClock(), MarlinBoard()
+    clock, board = InterruptingClock(), MarlinBoard()
     config = StageConfig(
         driver="marlin", port=register_board("marlin", board, clock),
         gap_at_zero_mm=160.0, direction=-1, steps_per_mm=80.0, feed_mm_min=600.0,
@@ -178,3 +185,94 @@ def test_the_counted_steps_are_believed_before_the_planned_position():
     assert read_position(["X:99.00 Y:0 Count X:800 Y:0"], "X", 80.0) == 10.0
     assert read_position(["X:12.50 Y:0.00 Z:0.00"], "X", 80.0) == 12.5
     assert read_position(["busy"], "X", 80.0) is None
+
+
+@pytest.mark.parametrize("old", [False, True], ids=["M118", "no M118"])
+@pytest.mark.parametrize("after_s", [0.0, 0.3, 2.5, 7.0])
+def test_ctrl_c_while_homing_stops_and_the_next_answers_are_not_off_by_one(
+    bench, after_s, old
+):
+    board, stage, clock = bench
+    board.old = old
+    stage.connect()
+    clock.at(clock.monotonic_s() + after_s, interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        stage.home()
+    assert board.seen[-1] == "M410"
+    assert stage.position_state == "unknown"
+    clock.sleep(10.0)  # without its emergency parser the board homes to the end
+    stage.home()
+    assert stage.goto_gap(150.0).gap_mm == pytest.approx(150.0, abs=0.02)
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.4, 1.1, 3.0])
+def test_ctrl_c_in_a_move_lets_the_piece_end_and_keeps_the_position(bench, after_s):
+    board, stage, clock = bench
+    stage.connect()
+    stage.home()
+    clock.at(clock.monotonic_s() + after_s, interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        stage.goto_gap(60.0)
+    assert "M410" not in board.seen
+    assert stage.position_state == "homed"
+    assert stage.goto_gap(80.0).gap_mm == pytest.approx(80.0, abs=0.02)
+
+
+def test_a_slow_piece_is_given_its_time_to_end(bench):
+    board, stage, clock = bench
+    stage.connect()
+    stage.home()
+    clock.at(clock.monotonic_s() + 2.0, interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        stage.goto_gap(150.0, feed_mm_min=15.0)  # 40 s for its 10 mm
+    assert "M410" not in board.seen
+    assert stage.position_state == "homed"
+
+
+def test_an_unseen_restart_is_found_by_the_jump_of_the_count(bench):
+    board, stage, _ = bench
+    stage.connect()
+    stage.home()
+    stage.goto_gap(100.0)
+    board.x_mm = 0.0  # its "start" was lost
+    with pytest.raises(PositionLostError, match="restarted, or another program"):
+        stage.goto_gap(90.0)
+    assert stage.position_state == "unknown"
+
+
+def test_a_board_without_soft_end_stops_has_no_known_travel(bench):
+    board, stage, _ = bench
+    board.old = True
+    stage.connect()
+    assert stage.limits.travel_mm is None
+    stage.home()
+    assert stage.goto_gap(150.0).gap_mm == pytest.approx(150.0, abs=0.02)
+
+
+def test_a_halted_board_says_so_until_it_is_restarted(bench):
+    board, stage, clock = bench
+    stage.connect()
+    stage.home()
+    board.say("Error:Printer halted. kill() called!", board.now_s)
+    board.silent = True
+    clock.sleep(0.1)
+    with pytest.raises(PositionLostError, match="halted"):
+        stage.goto_gap(60.0)
+    assert stage.position_state == "unknown"
+    assert stage.status().state == "alarm"
+    board.silent = False
+    board.say("start", board.now_s + 0.1)
+    stage.recover()
+    stage.home()
+    assert stage.position_state == "homed"
+
+
+def test_a_busy_board_is_not_a_silent_one(bench):
+    board, stage, clock = bench
+    stage.connect()
+    now_s = board.now_s
+    board._last_s = now_s + 9.0
+    for second in (2, 4, 6, 8):
+        board.say("echo:busy: processing", now_s + second)
+    assert stage.status().state == "idle"
+    assert clock.monotonic_s() > 9.0
