@@ -388,8 +388,8 @@ def _settings(
         for name, value in lengths.items()
         if value is not None
     }
-    if length_mm := given.get("length_mm"):
-        positive(length_mm, "--length-mm", "mm")
+    if "length_mm" in given:
+        positive(given["length_mm"], "--length-mm", "mm")
     if known is not None:
         given.setdefault("rod_height_mm", known.rod_height_mm)
         _below_the_camera(given["rod_height_mm"], known.camera_height_mm)

@@ -14,7 +14,8 @@ def write_bytes(path: Path, data: bytes) -> None:
     """Write `data` so that `path` holds the old content or all of the new.
 
     The bytes go to a temporary file in the same folder, are synced to the disk, renamed
-    over `path`, and the folder is synced, so that the rename survives a power cut.
+    over `path`, and the folder is synced, so that the rename survives a power cut. A
+    device or pipe (``/dev/stdout``) is written to, never replaced.
 
     Raises
     ------
@@ -28,6 +29,9 @@ def write_bytes(path: Path, data: bytes) -> None:
         raise InputError(
             f"the output file must have a name; instead received the folder {path}"
         )
+    if path.exists() and not path.is_file():
+        path.write_bytes(data)
+        return
     temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     try:
         with temporary.open("wb") as file:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -15,6 +15,7 @@ from ..core.toml import FileModel, read_toml
 from .calibration import Calibration, View
 
 Pair = tuple[float, float]
+Positive = Annotated[float, Field(gt=0.0)]
 Triple = tuple[float, float, float]
 
 
@@ -33,7 +34,7 @@ class CalibrationModel(FileModel):
 
     schema_version: Literal[1] = Field(1, alias="schema")
     image_size_px: tuple[int, int]
-    focal_px: Pair
+    focal_px: tuple[Positive, Positive]
     centre_px: Pair
     distortion: tuple[float, float, float, float, float]
     board_to_camera_rotation: tuple[Triple, Triple, Triple]

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from ..core.errors import VisionError
-from .photo import Photo, as_photo, read_photo
+from .photo import Photo, as_photo, read_photo, refuse_special
 
 PICTURES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"})
 VIDEOS = frozenset({".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm"})
@@ -60,6 +60,7 @@ def list_sources(paths: Iterable[Path]) -> list[Source]:
         elif not path.exists():
             raise VisionError(f"{path}: there is no such file")
         elif path.suffix.lower() in VIDEOS:
+            refuse_special(path)
             sources.extend(_of_video(path))
         else:
             sources.append(Source(image=path.name, path=path))
@@ -78,7 +79,9 @@ def _of_folder(folder: Path) -> list[Source]:
         sorted(
             path
             for path in within.iterdir()
-            if path.suffix.lower() in suffixes and not path.name.startswith(".")
+            if path.suffix.lower() in suffixes
+            and not path.name.startswith(".")
+            and not path.is_dir()
         )
         if within.is_dir()
         else []
@@ -152,6 +155,7 @@ def read_source(source: Source) -> Photo:
 
 def digest(source: Source) -> str:
     """Return the SHA-256 of the file (of a video: with the number of the frame)."""
+    refuse_special(source.path)
     key = _file_digest(source.path, source.path.stat().st_mtime_ns)
     return key if source.frame is None else f"{key}#{source.frame}"
 

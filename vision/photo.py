@@ -69,6 +69,7 @@ def read_photo(path: Path | str, *, linear: bool = False) -> Photo:
         If the file is missing, empty, cut off, no picture, or too small or too large.
     """
     path = Path(path)
+    refuse_special(path)
     try:
         data = path.read_bytes()
     except FileNotFoundError:
@@ -76,6 +77,18 @@ def read_photo(path: Path | str, *, linear: bool = False) -> Photo:
     except OSError as error:
         raise VisionError(f"{path}: cannot be read: {error.strerror}") from None
     return decode_photo(data, source=path.name, linear=linear)
+
+
+def refuse_special(path: Path) -> None:
+    """Refuse folders, and devices and pipes, whose reading may never end.
+
+    Raises
+    ------
+    VisionError
+        If something stands there that is no file.
+    """
+    if path.exists() and not path.is_file():
+        raise VisionError(f"{path}: cannot be read: it is a folder or pipe, not a file")
 
 
 def decode_photo(data: bytes, *, source: str = "data", linear: bool = False) -> Photo:

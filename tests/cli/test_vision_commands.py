@@ -179,6 +179,7 @@ def test_figure_and_edges_are_written(magbend, tmp_path, calibration):
         (["extract", BOARD, "--joints-mm", "a,b"], 1, "--joints-mm"),
         (["extract", BOARD, "--rod-height-mm", "nan"], 1, "--rod-height-mm"),
         (["extract", BOARD, "--length-mm", "-3"], 1, "--length-mm must be above zero"),
+        (["extract", BOARD, "--length-mm", "0"], 1, "--length-mm must be above zero"),
         (["extract", BOARD, "--figure-steps", "x.doc"], 1, ".pdf"),
         (["extract", BOARD, "--bare", "none.png"], 1, "none.png"),
         (["extract"], 2, "Missing argument"),

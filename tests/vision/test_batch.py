@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
@@ -142,17 +143,27 @@ def test_every_bad_picture_has_a_row_that_says_why(tmp_path, good):
     bad = tmp_path / "bad"
     bad.mkdir()
     files = broken_files(bad, good.image)
+    os.mkfifo(bad / "pipe.png")
+    (bad / "gone.png").symlink_to(tmp_path / "nowhere.png")
+    (bad / "folder.png").mkdir()
     save(bad / "zz_good.png", good.image)
     out = tmp_path / "out"
     result = extract_files([bad], out, settings=SETTINGS)
     rows = {row.image: row for row in result.frames}
     assert rows.pop("zz_good.png").ok
-    assert set(rows) == set(files)
+    assert set(rows) == {*files, "pipe.png", "gone.png"}
     for row in rows.values():
         assert row.status == "failed"
         assert row.flags
         assert len(row.reason) > 15
-    for name in ("empty.png", "cut.png", "cut.jpg", "text.png", "paper.png"):
+    for name in (
+        "empty.png",
+        "cut.png",
+        "cut.jpg",
+        "text.png",
+        "paper.png",
+        "pipe.png",
+    ):
         assert rows[name].flags == ("unreadable",), name
     assert "calibration_mismatch" in rows["small.png"].flags
     assert set(read_centrelines(out / "centrelines.csv")) == {"zz_good.png"}

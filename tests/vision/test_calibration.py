@@ -133,6 +133,7 @@ def test_saved_calibration_comes_back(tmp_path):
     [
         (lambda d: d.pop("focal_px"), "focal_px"),
         (lambda d: d.update(focal=3), "focal"),
+        (lambda d: d.update(focal_px=[-1.0, 2500.0]), "focal_px"),
         (lambda d: d.update(board_to_camera_rotation=[[1, 0, 0]] * 3), "rotation"),
     ],
 )
