@@ -268,6 +268,8 @@ def _carry_out(
         progress(plan.model.name) as tell,
     ):
         _assume(devices, assume_gap_mm)
+        for note in devices.notes:
+            report(f"note: {note}")
         return carry_out(
             plan, devices, folder, resume=resume, twin=twin_seed is not None,
             control=control, report=report, progress=tell,

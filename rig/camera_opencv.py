@@ -7,7 +7,6 @@ opened anew, since the old object never recovers.
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
 import cv2
@@ -15,20 +14,10 @@ import numpy as np
 
 from ..core.errors import CameraError
 from .camera import Image
+from .camera_lock import Settings, lock, not_kept, read_back
 from .camera_mjpeg import decode_jpeg
 from .clock import Clock
 from .config import CameraConfig
-
-_SETTINGS = {
-    "width_px": cv2.CAP_PROP_FRAME_WIDTH,
-    "height_px": cv2.CAP_PROP_FRAME_HEIGHT,
-    "exposure": cv2.CAP_PROP_EXPOSURE,
-    "gain": cv2.CAP_PROP_GAIN,
-    "white_balance_K": cv2.CAP_PROP_WB_TEMPERATURE,
-}
-# V4L2: 3 is automatic, 1 manual; often only the change from one to the other works.
-# DirectShow: 0.75 is automatic, 0.25 manual.
-_MANUAL = (3.0, 1.0) if sys.platform.startswith("linux") else (0.75, 0.25)
 
 
 class OpenCvSource:
@@ -49,14 +38,20 @@ class OpenCvSource:
         self._config = config
         self._clock = clock
         self._capture: cv2.VideoCapture | None = None
-        self._settings: dict[str, Any] = {}
+        self._settings: Settings = {}
         self._is_raw = False
+        self._is_first = True
 
     @property
     def identity(self) -> dict[str, Any]:
         """Return OpenCV's backend and every setting as asked, accepted, read back."""
         name = self._capture.getBackendName() if self._capture else None
-        return {"backend": "opencv", "api": name, "settings": self._settings}
+        return {
+            "backend": "opencv",
+            "api": name,
+            "settings": self._settings,
+            "notes": not_kept(self._settings),
+        }
 
     def open(self) -> None:
         """Open the device and lock its settings.
@@ -81,7 +76,8 @@ class OpenCvSource:
                 f"camera {self._source!r} cannot be opened; magbend doctor lists the "
                 f"cameras that answer"
             )
-        self._settings = self._lock(self._capture)
+        self._settings = lock(self._capture, self._config)
+        self._is_first = True
         # Undecoded parts of a motion JPEG show what the decoder hides: a missing end.
         code = int(self._capture.get(cv2.CAP_PROP_FOURCC))
         is_network = isinstance(self._source, str) and "://" in self._source
@@ -107,6 +103,9 @@ class OpenCvSource:
         is_read, image = self._capture.read()
         if not is_read or image is None:
             raise CameraError(f"camera {self._source!r} stalled or was closed")
+        if self._is_first:  # some forget their settings when the pictures begin
+            read_back(self._capture, self._settings)
+            self._is_first = False
         if self._is_raw:
             return decode_jpeg(image.tobytes()), began_s
         return np.asarray(image), began_s
@@ -116,26 +115,3 @@ class OpenCvSource:
         if self._capture is not None:
             self._capture.release()
             self._capture = None
-
-    def _lock(self, capture: cv2.VideoCapture) -> dict[str, Any]:
-        settings: dict[str, Any] = {}
-        if self._config.exposure is not None:
-            accepted = [
-                capture.set(cv2.CAP_PROP_AUTO_EXPOSURE, value) for value in _MANUAL
-            ]
-            settings["auto_exposure"] = {
-                "asked": _MANUAL[-1],
-                "accepted": accepted[-1],
-                "read_back": capture.get(cv2.CAP_PROP_AUTO_EXPOSURE),
-            }
-        if self._config.white_balance_K is not None:
-            capture.set(cv2.CAP_PROP_AUTO_WB, 0)
-        for name, prop in _SETTINGS.items():
-            asked = getattr(self._config, name)
-            if asked is not None:
-                settings[name] = {
-                    "asked": asked,
-                    "accepted": capture.set(prop, float(asked)),
-                    "read_back": capture.get(prop),
-                }
-        return settings

@@ -204,7 +204,6 @@ class CaptureCamera:
             source = self._make_source()
             try:
                 source.open()
-                self._source_identity = source.identity
                 while not self._is_closing():
                     if self._read_one(source):
                         failures = 0
@@ -228,6 +227,7 @@ class CaptureCamera:
             image, began_s = source.read()
             if self._torn.is_torn(image):
                 raise BrokenPictureError("its lower rows are one flat grey")
+            self._source_identity = source.identity
         except BrokenPictureError as error:
             with self._changed:
                 self._state.counters.broken += 1

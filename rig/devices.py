@@ -25,6 +25,11 @@ class Devices:
     meter: Meter
     clock: Clock
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the devices do but a bench should not: sentences for people."""
+        return (*self.stage.identity.notes, *self.camera.identity.get("notes", ()))
+
     def utc(self) -> str:
         """Return the UTC time of the bench's clock, ISO 8601 with milliseconds."""
         text = self.clock.utc().isoformat(timespec="milliseconds")

@@ -14,6 +14,7 @@ from typing import Any, TextIO
 
 from ..core.errors import StageError
 from .clock import Clock
+from .ports import why_not_open
 from .stage import LinkLostError
 
 _SLICE_S = 0.02
@@ -121,7 +122,7 @@ class Link:
                 port.dtr = self._dtr
             port.open()
         except (OSError, ValueError) as error:
-            raise StageError(_why_not_open(self.port, error)) from None
+            raise StageError(why_not_open(self.port, error)) from None
         self._serial = port
         self._owner = threading.get_ident()
         self._buffer.clear()
@@ -266,22 +267,3 @@ class Link:
     def _remark(self, text: str) -> None:
         if self._log:
             self._log.record(self._device, "--", text)
-
-
-def _why_not_open(port: str, error: Exception) -> str:
-    text = str(error)
-    busy = ("exclusively lock", "Access is denied", "busy", "temporarily unavailable")
-    if any(word in text for word in busy):
-        return (
-            f"the port {port} is in use by another program; close that program, or "
-            "stop it with: magbend rig stop"
-        )
-    if isinstance(error, PermissionError) or "Permission denied" in text:
-        return (
-            f"the port {port} may not be opened by this user; on Linux add the user "
-            "to the group dialout and log in again"
-        )
-    return (
-        f"the port {port} cannot be opened: {text}; "
-        "magbend rig ports lists what is there"
-    )

@@ -18,6 +18,7 @@ from ..core.errors import MeterError
 from .meter import Flux, Sample, combine
 from .meter_description import MeterDescription
 from .meter_parse import parse_multiplier, parse_reply, parse_unit
+from .ports import why_not_open
 from .virtual import register_twin_urls
 
 logger = logging.getLogger(__name__)
@@ -134,8 +135,7 @@ class SerialMeter:
             device.open()
         except (OSError, ValueError, serial.SerialException) as error:
             raise MeterError(
-                f"{self._description.name}: the port {self._port} cannot be opened: "
-                f"{error}; `magbend rig ports` lists what is there"
+                f"{self._description.name}: {why_not_open(self._port, error)}"
             ) from None
         return device
 

@@ -34,7 +34,8 @@ def open_camera(config: CameraConfig, folder: Path, clock: Clock) -> Camera:
     CameraError
         If it cannot be opened or gives no picture.
     ConfigError
-        If it is the twin's: that one is made by `magbend.analysis.twin`.
+        If it is the twin's (that one is made by `magbend.analysis.twin`), or a setting
+        is asked for that the backend cannot make.
     """
     source = config.source
     backend = (
@@ -45,6 +46,8 @@ def open_camera(config: CameraConfig, folder: Path, clock: Clock) -> Camera:
             "camera.backend twin is the computed bench: it needs the twin's devices "
             "(magbend.analysis.twin)"
         )
+    if backend != "opencv":
+        _refuse_settings(config, backend)
     if backend in ("folder", "video"):
         return _open_files(config, backend, folder / str(source), clock)
     make: Callable[[], Source]
@@ -64,6 +67,16 @@ def open_camera(config: CameraConfig, folder: Path, clock: Clock) -> Camera:
         device = int(source) if str(source).isdigit() else source
         make = lambda: OpenCvSource(device, config, clock)  # noqa: E731
     return CaptureCamera(make, _without_password(str(source)), config, clock)
+
+
+def _refuse_settings(config: CameraConfig, backend: str) -> None:
+    for name in ("exposure", "gain", "white_balance_K", "width_px", "height_px"):
+        if getattr(config, name) is not None:
+            raise ConfigError(
+                f"camera.{name} cannot be set through the backend {backend}: it only "
+                "receives pictures; set it at the camera or its program, and leave "
+                "the key out"
+            )
 
 
 def _open_files(config: CameraConfig, backend: str, path: Path, clock: Clock) -> Camera:

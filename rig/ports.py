@@ -62,3 +62,23 @@ def resolve_port(spec: str) -> str:
     raise StageError(
         f"stage.port = {spec!r} fits more than one port ({seen}); name one of them"
     )
+
+
+def why_not_open(port: str, error: Exception) -> str:
+    """Return why a port does not open, and the way out, in a sentence."""
+    text = str(error)
+    busy = ("exclusively lock", "Access is denied", "busy", "temporarily unavailable")
+    if any(word in text for word in busy):
+        return (
+            f"the port {port} is in use by another program; close that program, or "
+            "stop it with: magbend rig stop"
+        )
+    if isinstance(error, PermissionError) or "Permission denied" in text:
+        return (
+            f"the port {port} may not be opened by this user; on Linux add the user "
+            "to the group dialout and log in again"
+        )
+    return (
+        f"the port {port} cannot be opened: {text}; "
+        "magbend rig ports lists what is there"
+    )

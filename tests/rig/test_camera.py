@@ -324,6 +324,13 @@ def test_a_video_is_replayed_frame_by_frame(tmp_path: Path) -> None:
     camera.close()
 
 
+@pytest.mark.parametrize("name", ["exposure", "gain", "white_balance_K", "width_px"])
+def test_a_setting_that_a_stream_cannot_take_is_refused(name: str) -> None:
+    config = CameraConfig(source="http://127.0.0.1:9/stream", **{name: 100})
+    with pytest.raises(ConfigError, match=rf"camera\.{name} cannot be set"):
+        open_camera(config, Path(), SystemClock())
+
+
 def test_the_twin_camera_is_not_made_here() -> None:
     with pytest.raises(ConfigError, match="twin"):
         open_camera(CameraConfig(backend="twin"), Path(), SteppedClock())
