@@ -11,9 +11,9 @@ import math
 from typing import Final
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ..core.jit import njit
 from ..sim.batch_shapes import in_threads
 
 Array = NDArray[np.float64]

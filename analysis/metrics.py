@@ -11,11 +11,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from ..core.centreline import Centreline
 from ..core.errors import InputError
+from ..core.jit import njit
 
 Array = NDArray[np.float64]
 

@@ -22,9 +22,9 @@ def is_warm() -> bool:
     from ..vision.edges import _sample
 
     for kernel in (solve_rows, solve_from, _sample):
-        cache = getattr(kernel, "_cache", None)
+        cache = getattr(kernel.compiled, "_cache", None)
         folder = Path(getattr(cache, "cache_path", ""))
-        if not any(folder.glob(f"*{kernel.py_func.__name__}-*.nbi")):
+        if not any(folder.glob(f"*{kernel.__name__}-*.nbi")):
             return False
     return True
 

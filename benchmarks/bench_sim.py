@@ -6,7 +6,8 @@ time, the best of several runs, so that they mean something on a busy machine.
 
 from __future__ import annotations
 
-import statistics
+import math
+import resource
 import subprocess
 import sys
 import time
@@ -19,6 +20,16 @@ from magbend.core.magnet import Magnet
 from magbend.core.units import MU0
 from magbend.sim import MagnetField, UniformField, gmc, solve, solve_many
 
+COMMANDS = (
+    "--help",
+    "sim --help",
+    "sim shape --gmc 2 --field-mT 50",
+    "sim shape --gmc 2 --field-mT 50 --model solid",
+    "sim shape --gmc 2 --field-mT 50 --density-kg-m3 2640 --gravity-m-s2 0 0 -9.81",
+    "sim shape --gmc 2 --field-mT 50 --verify",
+    "sim equilibria --gmc 2",
+    "sim magnet",
+)
 TIP = np.array([29.5353236353478, 4.70952405678937])
 CUBE = Magnet.cube(55.0, 1.305)
 
@@ -108,27 +119,25 @@ def batches(n: int = 100_000) -> None:
         )
 
 
+def processor_ms(arguments: list[str], runs: int = 7) -> float:
+    """Processor time of a whole process, children and all, the best of some runs."""
+    best = math.inf
+    for _ in range(runs):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run([sys.executable, *arguments], check=True, capture_output=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        best = min(best, used * 1e3)
+    return best
+
+
 def start_up() -> None:
-    """A whole command beside the imports it cannot do without."""
-
-    def median(command: list[str]) -> float:
-        times = []
-        for _ in range(9):
-            start = time.perf_counter()
-            subprocess.run(command, check=True, capture_output=True)
-            times.append(time.perf_counter() - start)
-        return statistics.median(times)
-
-    base = median([sys.executable, "-c", "import numpy, numba"])
-    code = (
-        "import sys; from magbend.cli.main import main; "
-        "sys.argv = 'magbend sim shape --gmc 2 --field-mT 50'.split(); main()"
-    )
-    whole = median([sys.executable, "-c", code])
-    print(f"import numpy, numba          {base * 1e3:8.0f} ms")
-    print(
-        f"magbend sim shape            {whole * 1e3:8.0f} ms   ratio {whole / base:.2f}"
-    )
+    """Whole commands beside the imports that compiled kernels cannot do without."""
+    base = processor_ms(["-c", "import numpy, numba"])
+    print(f"import numpy, numba {base:6.0f} ms")
+    for typed in COMMANDS:
+        whole = processor_ms(["-m", "magbend.cli.main", *typed.split()])
+        print(f"{whole:6.0f} ms, ratio {whole / base:.2f}: magbend {typed}")
 
 
 def elastica(ours: float) -> None:

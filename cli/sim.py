@@ -70,6 +70,7 @@ def shape(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Predict the shape of a rod in a uniform field or before a magnet."""
+    from ..core.jit import once
     from ..sim.fields import Support
     from ..sim.solve import solve
 
@@ -80,8 +81,15 @@ def shape(
         gravity_m_s2=gravity_m_s2,
         load_factor=load_factor,
     )
-    solution = solve(
-        rod, field, support=support, model=model, poisson_ratio=poisson, points=points
+    solution = once(
+        lambda: solve(
+            rod,
+            field,
+            support=support,
+            model=model,
+            poisson_ratio=poisson,
+            points=points,
+        )
     )
     data = _summary(rod, model, solution)
     if verify and solution.centreline is not None:

@@ -46,6 +46,7 @@ def equilibria(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Find every planar equilibrium of a weightless rod, stable or not."""
+    from ..core.jit import once
     from ..sim.equilibria import find_equilibria
     from ..sim.equilibria_folds import trace_branches
     from ..sim.fields import Support, UniformField
@@ -53,10 +54,10 @@ def equilibria(
     rod = _specimen(gmc, specimen, remeasured)
     field = UniformField(flux_mT=field_mT, angle_deg=angle_deg)
     support = Support(clamp_angle_deg=clamp_angle_deg, load_factor=load_factor)
-    found = find_equilibria(rod, field, support=support)
+    found = once(lambda: find_equilibria(rod, field, support=support))
     branches: tuple[Branch, ...] = ()
     if fold or figure is not None:
-        branches = trace_branches(rod, field, support=support)
+        branches = once(lambda: trace_branches(rod, field, support=support))
     if figure is not None:
         from ..sim.equilibria_figure import draw_equilibria
 

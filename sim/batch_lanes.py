@@ -16,8 +16,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ..core.jit import njit
 from .magnet_field import inside, plane_flux
 from .planar_march import E, H, M
 from .taylor8 import ROWS, lane_step

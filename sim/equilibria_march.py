@@ -19,8 +19,9 @@ saddle, so that tips exponentially close to the field's direction keep their dig
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ..core.jit import njit
 
 ORDER = 22
 STEP = 0.35

@@ -25,10 +25,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.errors import InputError
+from ..core.jit import njit
 from ..core.magnet import Magnet
 
 FAR = 4.0

@@ -21,9 +21,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ..core.jit import njit
 from .magnet_field import inside
 from .planar_march import MAX_ORDER, PART, STATE, WX, WY, E, H, M, march
 

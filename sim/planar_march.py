@@ -29,8 +29,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from ..core.jit import njit
 from .magnet_field import plane_flux
 
 PART = {

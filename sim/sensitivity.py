@@ -21,11 +21,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.checks import finite
 from ..core.errors import InputError, SolverError
+from ..core.jit import njit
 from ..core.specimen import Specimen
 from ..core.units import MU0, rad_from_deg
 from .fields import Field, MagnetField, Solution, Support, UniformField

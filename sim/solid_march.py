@@ -22,8 +22,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ..core.jit import njit
 from .magnet_field import cuboid_flux, inside
 from .planar import solve3
 from .planar_march import jacobi

@@ -25,8 +25,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ..core.jit import njit
 from .magnet_field import cuboid_flux
 
 H, C1, C2, C3, AXIAL, MU1, MU2, K1, K2, K3, WX, WY, WZ = range(13)

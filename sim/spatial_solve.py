@@ -12,8 +12,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from ..core.jit import njit
 from .magnet_field import inside
 from .spatial_march import (
     COLUMN,

@@ -11,7 +11,7 @@ the frame's own axis (no weight), with the columns of the tip angle and of the l
 
 from __future__ import annotations
 
-from numba import njit
+from ..core.jit import njit
 
 ORDER = 8
 ROWS = 13

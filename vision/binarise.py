@@ -14,8 +14,9 @@ from functools import lru_cache
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from ..core.jit import njit
 
 WORK_PX = 1000
 """The longer side of the working picture, roughly."""

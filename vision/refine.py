@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ..core.jit import njit
 from .centreline_fit import SHARED, CurveFit, fit_curve
 from .clamp import ClampLines, find_clamp
 from .curve import Curve

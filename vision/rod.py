@@ -13,9 +13,9 @@ from typing import Literal
 
 import cv2
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ..core.jit import njit
 from .binarise import Binary
 
 Array = NDArray[np.float64]

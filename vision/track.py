@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from ..core.jit import njit
 from .centreline_fit import fit_curve
 from .curve import Curve
 from .edges import STEP_PX, _bilinear, rough_edges

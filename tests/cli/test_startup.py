@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -39,6 +40,16 @@ print("\\n" + json.dumps([code, [name for name in {heavy!r} if name in sys.modul
 """
 
 
+def probe(arguments: list[str]) -> tuple[int | None, list[str]]:
+    """Run a command in a process of its own; return exit code and heavy imports."""
+    code = PROBE.format(arguments=arguments, heavy=HEAVY)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    stop, loaded = json.loads(done.stdout.splitlines()[-1])
+    return stop, loaded
+
+
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -58,13 +69,31 @@ print("\\n" + json.dumps([code, [name for name in {heavy!r} if name in sys.modul
     ids=" ".join,
 )
 def test_help_imports_nothing_heavy(arguments: list[str]) -> None:
-    probe = PROBE.format(arguments=arguments, heavy=HEAVY)
-    done = subprocess.run(
-        [sys.executable, "-c", probe], capture_output=True, text=True, check=True
-    )
-    code, loaded = json.loads(done.stdout.splitlines()[-1])
+    code, loaded = probe(arguments)
     assert code in (0, None)
     assert loaded == []
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["sim", "shape", "--gmc", "2", "--field-mT", "50"],
+        ["sim", "shape", "--gmc", "2", "--field-mT", "50", "--model", "solid"],
+        ["sim", "shape", "--specimen", "ROD", "--magnet", "MAGNET", "--gap-mm", "60"],
+        ["sim", "equilibria", "--gmc", "2", "--fold"],
+        ["sim", "magnet"],
+    ],
+    ids=" ".join,
+)
+def test_one_solve_imports_no_compiler(arguments: list[str], tmp_path: Path) -> None:
+    magnet = tmp_path / "magnet.toml"
+    magnet.write_text("side_mm = 55.0\nremanence_T = 1.305\n")
+    specimen = Path(__file__).parents[2] / "fixtures" / "specimens" / "gmc2.toml"
+    files = {"ROD": str(specimen), "MAGNET": str(magnet)}
+    typed = [files.get(word, word) for word in arguments]
+    code, loaded = probe(typed)
+    assert code in (0, None)
+    assert set(loaded) <= {"numpy", "pydantic"}
 
 
 def commands(app: object, path: tuple[str, ...] = ()) -> list[tuple[str, ...]]:

@@ -1,0 +1,105 @@
+"""Kernels: functions on arrays that numba compiles, or that run as they are written.
+
+Machine code is a thousand times as fast as Python, but importing numba and loading the
+code it keeps takes half a second, and compiling it a minute. A process that solves one
+rod and ends is done sooner in plain Python: it puts its task through `once`. Everyone
+else calls kernels and gets machine code.
+"""
+
+from __future__ import annotations
+
+import functools
+import threading
+from collections.abc import Callable
+from contextvars import ContextVar
+from typing import Any, TypeVar
+
+Result = TypeVar("Result")
+
+PATIENCE = 5_000
+"""Calls of kernels, a few tenths of a second, after which a task goes on compiled."""
+
+_LOCK = threading.RLock()
+_calls_left: ContextVar[list[int] | None] = ContextVar("calls_left", default=None)
+
+
+class _Unfit(BaseException):
+    """Plain Python takes too long, or refuses what machine code computes."""
+
+
+class Kernel:
+    """A function compiled when it is first called, or needed by another kernel.
+
+    Parameters
+    ----------
+    function : callable
+        What to compile.
+    options : dict
+        Of `numba.njit`.
+    """
+
+    __name__: str
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        functools.update_wrapper(self, function)
+        self._function = function
+        self._options = options
+        self._compiled: Any = None
+
+    @property
+    def compiled(self) -> Any:
+        """Numba's dispatcher of the function."""
+        if self._compiled is None:
+            with _LOCK:
+                if self._compiled is None:
+                    from numba import njit as numba_njit
+
+                    self._compiled = numba_njit(**self._options)(self._function)
+        return self._compiled
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What numba takes this for where another kernel calls it."""
+        return self.compiled._numba_type_
+
+    def __reduce__(self) -> str:
+        """Pickle as the name that another process imports."""
+        return self._function.__qualname__
+
+    def __call__(self, *args: Any) -> Any:
+        """Run compiled or, within `once`, as written."""
+        left = _calls_left.get()
+        if left is None:
+            return self.compiled(*args)
+        left[0] -= 1
+        if left[0] < 0:
+            raise _Unfit
+        try:
+            return self._function(*args)
+        except (ArithmeticError, ValueError):
+            # 1 / 0 and sqrt(-1) are numbers to machine code.
+            raise _Unfit from None
+
+
+def njit(**options: Any) -> Callable[[Callable[..., Any]], Kernel]:
+    """Make a function a kernel (options of `numba.njit`)."""
+    return lambda function: Kernel(function, options)
+
+
+def once(task: Callable[[], Result]) -> Result:
+    """Return `task()`, quickest if this process does it once.
+
+    Kernels called by `task` run as plain Python. If that takes long, `task` starts
+    again with compiled ones; so it must do nothing but compute.
+    """
+    import numpy as np
+
+    token = _calls_left.set([PATIENCE])
+    try:
+        with np.errstate(all="ignore"):
+            return task()
+    except _Unfit:
+        pass
+    finally:
+        _calls_left.reset(token)
+    return task()

@@ -1,0 +1,100 @@
+"""Kernels give the same numbers as plain Python and as machine code."""
+
+from __future__ import annotations
+
+import math
+import pickle
+import subprocess
+import sys
+import threading
+
+import numpy as np
+import pytest
+
+from magbend.core import jit
+from magbend.core.jit import njit, once
+
+
+@njit()
+def ratio(a, b):
+    return a / b
+
+
+@njit(error_model="numpy")
+def quotient(a, b):
+    return a / b
+
+
+@njit()
+def power_sum(x, n):
+    total = 0.0
+    for k in range(n):
+        total += ratio(x, k + 1.0)
+    return total
+
+
+def test_a_kernel_called_by_a_kernel_compiles_with_it() -> None:
+    harmonic = sum(2.0 / k for k in range(1, 11))
+    assert power_sum(2.0, 10) == pytest.approx(harmonic, rel=1e-15)
+    assert once(lambda: power_sum(2.0, 10)) == power_sum(2.0, 10)
+
+
+def test_once_runs_as_written_and_needs_no_numba() -> None:
+    code = (
+        "import sys; from magbend.core.jit import once\n"
+        "from magbend.sim import UniformField, gmc, solve\n"
+        "once(lambda: solve(gmc(2), UniformField(flux_mT=50.0)))\n"
+        "assert 'numba' not in sys.modules\n"
+        "solve(gmc(2), UniformField(flux_mT=50.0))\n"
+        "assert 'numba' in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_long_work_goes_on_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(jit, "PATIENCE", 5)
+    starts = []
+
+    def task() -> float:
+        starts.append(jit._calls_left.get() is not None)
+        return power_sum(1.0, 8)
+
+    assert once(task) == power_sum(1.0, 8)
+    assert starts == [True, False]
+    assert jit._calls_left.get() is None
+
+
+def test_what_python_refuses_is_left_to_machine_code() -> None:
+    assert once(lambda: quotient(1.0, 0.0)) == math.inf
+    assert once(lambda: quotient(np.float64(1.0), 0.0)) == math.inf
+
+
+def test_errors_of_the_task_itself_pass_through_and_leave_no_trace() -> None:
+    def task() -> None:
+        raise ValueError("mine")
+
+    with pytest.raises(ValueError, match="mine"):
+        once(task)
+    assert jit._calls_left.get() is None
+
+
+def test_other_threads_keep_machine_code() -> None:
+    seen = []
+
+    def task() -> None:
+        worker = threading.Thread(
+            target=lambda: seen.append(jit._calls_left.get() is None)
+        )
+        worker.start()
+        worker.join()
+
+    once(task)
+    assert seen == [True]
+
+
+def test_a_kernel_keeps_its_name_and_goes_to_other_processes() -> None:
+    from magbend.sim.planar import newton
+
+    assert newton.__name__ == "newton"
+    assert "equilibrium" in str(newton.__doc__)
+    assert pickle.loads(pickle.dumps(newton)) is newton
