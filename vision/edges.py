@@ -26,6 +26,9 @@ Image = NDArray[np.float32]
 STEP_PX = 0.5
 """Distance of samples along a profile."""
 
+EDGE_LEVEL, SHADED_LEVEL = 0.27, 0.4
+"""Where a rough edge is, from rod to paper, and from rod to shade right beside it."""
+
 _ROOT_2PI = 2.5066282746310002
 
 
@@ -158,13 +161,13 @@ def find_edges(
 
 
 def rough_edges(
-    grey: Image, points: Array, normals: Array, *, reach: float, sign: float = 1.0,
-    level: float | None = None,
-) -> tuple[Array, Array, float]:  # fmt: skip
+    grey: Image, points: Array, normals: Array, *, reach: float, sign: float = 1.0
+) -> tuple[Array, Array, float, float]:  # fmt: skip
     """Return where the dark of a rod ends on either side, to about a pixel.
 
-    The level is a quarter of the way from rod to paper, under that of most shadows, and
-    is looked for from outside, so that a streak of glare on the rod does no harm.
+    The level is a quarter of the way from rod to paper, or lower where deep shade lies
+    beside the rod, and is looked for from outside, so that a streak of glare on the rod
+    does no harm.
 
     Parameters
     ----------
@@ -176,30 +179,49 @@ def rough_edges(
         Largest offset, px: the half width with whatever shadow was taken for rod.
     sign : float
         -1 for a light rod.
-    level : float, optional
-        The level, where it is known already.
 
     Returns
     -------
     low, high : ndarray, shape (n,)
         Offsets of the edges; NaN where the profile is nowhere dark.
-    level : float
-        The level taken.
+    dark, level : float
+        Light of the rod, and the level taken, the lower one of both sides.
     """
     count = int(np.ceil((reach + 2.0) / STEP_PX))
     strip = np.empty((len(points), 2 * count), dtype=np.float32)
     axis = np.zeros(len(points))
     _sample(grey, points, normals, axis, 1.0, count, np.float32(sign), strip)
-    if level is None:
-        dark = median(strip[:, 2 * count // 3 : 4 * count // 3].ravel())
-        paper = median(np.fmax.reduce(strip, axis=1))
-        level = dark + 0.27 * (paper - dark)
+    # Of the whole profile: where the curve runs along the edge of a deep shadow, the
+    # profile's middle is half shadow.
+    dark = median(np.quantile(strip[::8], 0.2, axis=1))
+    paper = median(np.fmax.reduce(strip, axis=1))
+    level = dark + EDGE_LEVEL * (paper - dark)
+    # Again under the shade that lies beside the dark, which may be far from white.
+    low, high = _dark_within(strip, count, level)
+    left = min(level, dark + SHADED_LEVEL * (_light_at(strip, count, low - 4.0) - dark))
+    right = min(
+        level, dark + SHADED_LEVEL * (_light_at(strip, count, high + 4.0) - dark)
+    )
+    low, _ = _dark_within(strip, count, left)
+    _, high = _dark_within(strip, count, right)
+    return low, high, dark, min(left, right)
+
+
+def _light_at(strip: Image, count: int, place: Array) -> float:
+    """Return the median light of the profiles at one place of each."""
+    known = np.flatnonzero(np.isfinite(place))
+    column = np.clip(place[known] / STEP_PX + count, 0, strip.shape[1] - 1).astype(int)
+    return median(strip[known, column])
+
+
+def _dark_within(strip: Image, count: int, level: float) -> tuple[Array, Array]:
+    """Return the outermost places of each profile where it is darker than a level."""
     inside = strip < level
     offsets = (np.arange(2 * count) - count + 0.5) * STEP_PX
     some = inside.any(axis=1)
     low = np.where(some, offsets[np.argmax(inside, axis=1)], np.nan)
     high = np.where(some, offsets[::-1][np.argmax(inside[:, ::-1], axis=1)], np.nan)
-    return low - 0.5 * STEP_PX, high + 0.5 * STEP_PX, level
+    return low - 0.5 * STEP_PX, high + 0.5 * STEP_PX
 
 
 @njit(cache=True)

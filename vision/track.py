@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..core.jit import njit
 from .centreline_fit import fit_curve
 from .curve import Curve
-from .edges import STEP_PX, _bilinear, rough_edges
+from .edges import SHADED_LEVEL, STEP_PX, _bilinear, rough_edges
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -65,7 +65,7 @@ def start_curve(
     """
     _, along, theta = _resample(points, 0.6 * width)
     normals = np.column_stack([-np.sin(theta), np.cos(theta)])
-    low, high, level = rough_edges(
+    low, high, dark, level = rough_edges(
         grey, along, normals, reach=0.5 * width + 6.0, sign=sign
     )
     across = high - low
@@ -79,8 +79,8 @@ def start_curve(
     centre = along + (0.5 * (low + high))[:, None] * normals
     centres = centre[good][:: max(1, int(0.4 * real))]
     if follow:
-        centres = _follow(grey, centres[2:], real, sign, level)
-    centres = _follow(grey, centres[::-1], real, sign, level)[::-1]
+        centres = _follow(grey, centres[2:], real, sign, dark, level)
+    centres = _follow(grey, centres[::-1], real, sign, dark, level)[::-1]
     return Start(curve=smooth_curve(centres, spacing=2.0 * real), width=real)
 
 
@@ -108,26 +108,32 @@ def _resample(points: Array, window: float) -> tuple[Array, Array, Array]:
 
 
 def _follow(
-    grey: Image, centres: Array, width: float, sign: float, level: float
+    grey: Image, centres: Array, width: float, sign: float, dark: float, level: float
 ) -> Array:
     """Carry centres on at the root end, at most seven widths."""
     step = max(2.0, 0.25 * width)
     room = int(7.0 * width / step) + 1
     path = np.zeros((room + min(len(centres), _RECENT), 2))
     path[room:] = centres[:_RECENT]
-    head = _carry_on(grey, path, room, width, step, sign, level)
+    head = _carry_on(grey, path, room, width, step, sign, dark, level)
     return np.concatenate([path[head:room], centres])
 
 
 @njit(cache=True)
 def _carry_on(
     grey: Image, path: Array, head: int, width: float, step: float, sign: float,
-    level: float,
+    dark: float, level: float,
 ) -> int:  # fmt: skip
     """Fill the path before `head` while there are two edges; return its new head."""
     while head > 0 and len(path) - head >= 4:
         x, y, u, v = _predict(path[head : head + _RECENT], step)
-        low, high = _dark_span(grey, x, y, -v, u, 0.5 * width + 6.0, sign, level)
+        beside = 0.5 * width + 4.0
+        shade = min(
+            sign * _bilinear(grey, x - beside * v, y + beside * u),
+            sign * _bilinear(grey, x + beside * v, y - beside * u),
+        )
+        here = min(level, dark + SHADED_LEVEL * (shade - dark))
+        low, high = _dark_span(grey, x, y, -v, u, beside + 2.0, sign, here)
         aside = 0.5 * (low + high)
         alike = abs(high - low - width) < 0.2 * width + 0.5
         if not alike or abs(aside) > 0.2 * width:

@@ -81,11 +81,12 @@ def test_outside_the_picture_is_nan():
     assert _bilinear(image, 3.0, 3.0) == 1.0
 
 
-def test_rough_edges_see_through_a_shadow():
+@pytest.mark.parametrize("shade", [0.5, 0.35])
+def test_rough_edges_see_through_a_shadow(shade):
     image, points, normals = bar(0.0, 9.0, 0.8)
     t = points[0, 1] + np.arange(9, 18)
-    image[t.astype(int)] *= 0.5
-    low, high, _ = rough_edges(image, points, normals, reach=20.0)
+    image[t.astype(int)] *= shade
+    low, high, *_ = rough_edges(image, points, normals, reach=20.0)
     assert np.median(high - low) == pytest.approx(18.0, abs=1.0)
 
 
