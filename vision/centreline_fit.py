@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..core.jit import njit
 from .curve import Curve
-from .spline import bends, design, knots_between
+from .spline import Basis, add_squares, design, knots_between, penalty_on_bends
 
 Array = NDArray[np.float64]
 
@@ -52,10 +52,10 @@ class CurveFit:
         Effective number of parameters.
     jacobian : ndarray, shape (n, p)
         Change of the normal position by the parameters: origin, then coefficients.
-    basis, slopes : ndarray, shape (n, p - 1)
-        theta and kappa by the coefficients.
+    basis : Basis
+        The splines whose coefficients give theta and kappa.
     root : ndarray, shape (p, p)
-        Matrix R with R R^T the covariance of the parameters.
+        Upper triangular matrix R with R R^T the covariance of the parameters.
     """
 
     curve: Curve
@@ -64,29 +64,38 @@ class CurveFit:
     correlation: float
     freedom: float
     jacobian: Array
-    basis: Array
-    slopes: Array
+    basis: Basis
     root: Array
 
     @property
     def sigma(self) -> Array:
         """Standard deviation of the normal position, shape (n,)."""
-        return _deviation(self.jacobian, self.root)
+        first = np.zeros(len(self.jacobian), np.int64)
+        return np.asarray(_deviation(first, self.jacobian, self.root))
 
     @property
     def sigma_theta(self) -> Array:
         """Standard deviation of theta, shape (n,)."""
-        return _deviation(self.basis, self.root[1:])
+        return np.asarray(_deviation(self.basis.first + 1, self.basis.value, self.root))
 
     @property
     def sigma_kappa(self) -> Array:
         """Standard deviation of kappa, shape (n,)."""
-        return _deviation(self.slopes, self.root[1:])
+        return np.asarray(_deviation(self.basis.first + 1, self.basis.slope, self.root))
 
 
-def _deviation(rows: Array, root: Array) -> Array:
-    spread = rows @ root
-    return np.asarray(np.sqrt(np.einsum("ij,ij->i", spread, spread)))
+@njit(cache=True)
+def _deviation(first: NDArray[np.int64], rows: Array, root: Array) -> Array:
+    """Root of the diagonal of A R R^T A^T; a row of A holds `rows` from `first` on."""
+    out = np.empty(first.size)
+    for i in range(first.size):
+        spread = np.zeros(root.shape[1])
+        for j in range(rows.shape[1]):
+            row = first[i] + j
+            for k in range(row, spread.size):  # R is upper triangular
+                spread[k] += rows[i, j] * root[row, k]
+        out[i] = np.sqrt(np.sum(spread**2))
+    return out
 
 
 def fit_curve(
@@ -134,17 +143,16 @@ def fit_curve(
         With covariances.
     """
     knots = knots_between(s[0], s[-1], spacing, joints)
-    basis, slopes = design(knots, s)
-    basis_mid, _ = design(knots, 0.5 * (s[1:] + s[:-1]))
-    bend = bends(knots)
-    penalty = bend.T @ bend
+    basis, middle = design(knots, s), design(knots, 0.5 * (s[1:] + s[:-1]))
+    penalty = penalty_on_bends(knots)
     if theta is None:
         theta = _chord_angles(points)
     coefficients = _start(basis, theta, penalty * spacing**5)
-    origin = _origin(s, points, weights, basis_mid @ coefficients)
+    path = _integrate(s, np.zeros(2), coefficients, basis, middle)
+    origin = np.mean((points - path.curve.points)[weights > 0.0], axis=0)
     for turn in range(iterations):
-        path = _integrate(s, origin, coefficients, basis, basis_mid, slopes)
-        jacobian = _jacobian(path, basis_mid)
+        path = _integrate(s, origin, coefficients, basis, middle)
+        jacobian = _jacobian(path, middle, len(coefficients))
         system = _solve(
             jacobian, _residual(points, path, weights), weights, penalty, coefficients,
             stiffness, shared, within, last=turn == iterations - 1,
@@ -152,10 +160,10 @@ def fit_curve(
         turned = np.array([-path.rate[0, 1], path.rate[0, 0]])
         origin = origin + system.change[0] * turned
         coefficients = coefficients + system.change[1:]
-    path = _integrate(s, origin, coefficients, basis, basis_mid, slopes)
+    path = _integrate(s, origin, coefficients, basis, middle)
     residual = _residual(points, path, weights)
     return _with_covariance(
-        path.curve, residual, weights, within, jacobian, system, basis, slopes
+        path.curve, residual, weights, within, jacobian, system, basis
     )
 
 
@@ -172,39 +180,14 @@ def _chord_angles(points: Array) -> Array:
     return np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
 
 
-def _start(basis: Array, theta: Array, stiff: Array) -> Array:
+def _start(basis: Basis, theta: Array, stiff: Array) -> Array:
     """Return coefficients of a smooth curve through given angles."""
-    normal = np.zeros((basis.shape[1], basis.shape[1]))
-    right = np.zeros(basis.shape[1])
-    _accumulate(basis, theta, normal, right)
-    normal += 1e-3 * stiff
+    normal, right = 1e-3 * stiff, np.zeros(len(stiff))
     normal.flat[:: len(right) + 1] += 1e-9
+    add_squares(basis.first, basis.value, np.ones(len(theta)), normal)
+    for k in range(4):
+        np.add.at(right, basis.first + k, basis.value[:, k] * theta)
     return np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
-
-
-@njit(cache=True)
-def _accumulate(basis: Array, theta: Array, normal: Array, right: Array) -> None:
-    """Add basis^T basis and basis^T theta; at most four splines overlap."""
-    stations, count = basis.shape
-    first = 0
-    for i in range(stations):
-        while first < count - 1 and basis[i, first] == 0.0:
-            first += 1
-        end = min(first + 4, count)
-        for j in range(first, end):
-            right[j] += basis[i, j] * theta[i]
-            for k in range(first, end):
-                normal[j, k] += basis[i, j] * basis[i, k]
-
-
-def _origin(s: Array, points: Array, weight: Array, theta_mid: Array) -> Array:
-    h = s[1] - s[0]
-    path = np.zeros_like(points)
-    path[1:] = h * np.cumsum(
-        np.column_stack([np.cos(theta_mid), np.sin(theta_mid)]), axis=0
-    )
-    used = weight > 0.0
-    return np.asarray(np.mean((points - path)[used], axis=0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,15 +200,14 @@ class _Path:
 
 
 def _integrate(
-    s: Array, origin: Array, coefficients: Array, basis: Array, basis_mid: Array,
-    slopes: Array,
-) -> _Path:  # fmt: skip
-    theta = basis @ coefficients
+    s: Array, origin: Array, coefficients: Array, basis: Basis, middle: Basis
+) -> _Path:
+    theta = basis.values(coefficients)
     rate, points = np.empty((len(s), 2)), np.empty((len(s), 2))
     rate_mid = np.empty((len(s) - 1, 2))
     points[0] = origin
-    _walk(s[1] - s[0], theta, basis_mid @ coefficients, rate, rate_mid, points)
-    curve = Curve(s=s, points=points, theta=theta, kappa=slopes @ coefficients)
+    _walk(s[1] - s[0], theta, middle.values(coefficients), rate, rate_mid, points)
+    curve = Curve(s=s, points=points, theta=theta, kappa=basis.slopes(coefficients))
     return _Path(curve, rate, rate_mid)
 
 
@@ -251,35 +233,50 @@ def _residual(points: Array, path: _Path, weight: Array) -> Array:
     return np.where(weight == 0.0, 0.0, across)
 
 
-def _jacobian(path: _Path, basis_mid: Array) -> Array:
+def _jacobian(path: _Path, middle: Basis, count: int) -> Array:
     """Change of the normal position by origin (along its normal) and coefficients."""
+    jacobian = np.zeros((len(path.rate), count + 1))
     step = path.curve.s[1] - path.curve.s[0]
-    jacobian = np.empty((len(path.rate), basis_mid.shape[1] + 1))
-    _fill_jacobian(path.rate, path.rate_mid, basis_mid, step, jacobian)
+    _fill_jacobian(path.rate, path.rate_mid, middle.first, middle.value, step, jacobian)
     return jacobian
 
 
 @njit(cache=True)
 def _fill_jacobian(
-    rate: Array, rate_mid: Array, basis_mid: Array, step: float, jacobian: Array
-) -> None:
-    stations, count = basis_mid.shape
-    along_x, along_y = np.zeros(count), np.zeros(count)
-    first, end = 0, 0
-    for i in range(stations + 1):
+    rate: Array, rate_mid: Array, first: NDArray[np.int64], value: Array, step: float,
+    jacobian: Array,
+) -> None:  # fmt: skip
+    along = np.zeros((jacobian.shape[1] - 1, 2))
+    end = 0
+    for i in range(len(rate)):
         x, y = rate[i, 0], rate[i, 1]
         jacobian[i, 0] = x * rate[0, 0] + y * rate[0, 1]
         for k in range(end):
-            jacobian[i, k + 1] = x * along_y[k] - y * along_x[k]
-        for k in range(end, count):
-            jacobian[i, k + 1] = 0.0
-        if i < stations:
-            while first < count - 1 and basis_mid[i, first] == 0.0:
-                first += 1
-            end = min(first + 4, count)
-            for k in range(first, end):
-                along_x[k] -= step * rate_mid[i, 1] * basis_mid[i, k]
-                along_y[k] += step * rate_mid[i, 0] * basis_mid[i, k]
+            jacobian[i, k + 1] = x * along[k, 1] - y * along[k, 0]
+        if i < first.size:
+            end = first[i] + 4
+            for j in range(4):
+                along[first[i] + j, 0] -= step * rate_mid[i, 1] * value[i, j]
+                along[first[i] + j, 1] += step * rate_mid[i, 0] * value[i, j]
+
+
+@njit(cache=True)
+def _normal_equations(
+    jacobian: Array, weight: Array, residual: Array, normal: Array, right: Array
+) -> None:
+    """Add J^T W J and J^T W r; a row of J ends in zeros."""
+    for i in range(weight.size):
+        end = right.size
+        while end > 0 and jacobian[i, end - 1] == 0.0:
+            end -= 1
+        for j in range(end):
+            share = weight[i] * jacobian[i, j]
+            right[j] += share * residual[i]
+            for k in range(j + 1):
+                normal[j, k] += share * jacobian[i, k]
+    for j in range(right.size):
+        for k in range(j):
+            normal[k, j] = normal[j, k]
 
 
 def _solve(
@@ -293,11 +290,9 @@ def _solve(
     last step any fair weight does: it moves only the point at which the next step is
     taken.
     """
-    weighted = jacobian * (weight / shared)[:, None]
-    normal = weighted.T @ jacobian
-    right = weighted.T @ residual
-    size = len(right)
-    full = np.zeros((size, size))
+    size = jacobian.shape[1]
+    normal, right, full = np.zeros((size, size)), np.zeros(size), np.zeros((size, size))
+    _normal_equations(jacobian, weight / shared, residual, normal, right)
     full[1:, 1:] = penalty
     pull = np.zeros(size)
     pull[1:] = penalty @ coefficients
@@ -368,7 +363,7 @@ def _eliminated(matrix: Array, right: Array) -> tuple[float, float]:
 
 def _with_covariance(
     curve: Curve, residual: Array, weight: Array, within: float, jacobian: Array,
-    system: _System, basis: Array, slopes: Array,
+    system: _System, basis: Basis,
 ) -> CurveFit:  # fmt: skip
     """Widen the covariance by what the residuals of neighbours have in common."""
     used = weight > 0.0
@@ -385,7 +380,6 @@ def _with_covariance(
         freedom=system.freedom,
         jacobian=jacobian,
         basis=basis,
-        slopes=slopes,
         root=system.inverse_root * noise * np.sqrt(correlation / system.shared),
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,25 +32,62 @@ def knots_between(
     return np.concatenate(pieces)
 
 
-def design(knots: Array, s: Array) -> tuple[Array, Array]:
-    """Return the cubic B-splines and their derivatives at s, each (n, count)."""
-    basis = np.zeros((len(s), len(knots) - _DEGREE - 1))
-    slopes = np.zeros_like(basis)
-    _fill_basis(knots, s, basis, slopes)
-    return basis, slopes
+class Basis(NamedTuple):
+    """The four cubic B-splines that are not zero at each of n points.
+
+    Parameters
+    ----------
+    first : ndarray of int, shape (n,)
+        Number of the first of them.
+    value, slope : ndarray, shape (n, 4)
+        Their values and derivatives.
+    """
+
+    first: NDArray[np.int64]
+    value: Array
+    slope: Array
+
+    def values(self, coefficients: Array) -> Array:
+        """Return the spline of these coefficients, shape (n,)."""
+        return np.asarray(_combined(self.first, self.value, coefficients))
+
+    def slopes(self, coefficients: Array) -> Array:
+        """Return its derivative, shape (n,)."""
+        return np.asarray(_combined(self.first, self.slope, coefficients))
+
+
+def design(knots: Array, s: Array) -> Basis:
+    """Return the B-splines at s, which must not fall."""
+    basis = Basis(
+        np.empty(len(s), np.int64), np.empty((len(s), 4)), np.empty((len(s), 4))
+    )
+    _fill_basis(knots, s, *basis)
+    return basis
 
 
 @njit(cache=True)
-def _fill_basis(knots: Array, s: Array, basis: Array, slopes: Array) -> None:
-    """Cox and de Boor's recurrence; s must not fall."""
-    count = basis.shape[1]
-    value = np.zeros(4)
+def _combined(first: NDArray[np.int64], value: Array, coefficients: Array) -> Array:
+    out = np.zeros(first.size)
+    for i in range(first.size):
+        for j in range(4):
+            out[i] += value[i, j] * coefficients[first[i] + j]
+    return out
+
+
+@njit(cache=True)
+def _fill_basis(
+    knots: Array, s: Array, first: NDArray[np.int64], values: Array, slopes: Array
+) -> None:
+    """Cox and de Boor's recurrence."""
+    count = knots.size - 4
     lower = np.zeros(4)
     k = 3
     for i in range(s.size):
         x = s[i]
         while k < count - 1 and x >= knots[k + 1]:
             k += 1
+        first[i] = k - 3
+        value = values[i]
         value[:] = 0.0
         value[3] = 1.0
         for degree in range(1, 4):
@@ -67,7 +105,6 @@ def _fill_basis(knots: Array, s: Array, basis: Array, slopes: Array) -> None:
                 value[j] = total
         for j in range(4):
             left = k - 3 + j
-            basis[i, left] = value[j]
             rate = 0.0
             span = knots[left + 3] - knots[left]
             if j > 0 and span > 0.0:
@@ -75,17 +112,31 @@ def _fill_basis(knots: Array, s: Array, basis: Array, slopes: Array) -> None:
             span = knots[left + 4] - knots[left + 1]
             if j < 3 and span > 0.0:
                 rate -= lower[j + 1] / span
-            slopes[i, left] = 3.0 * rate
+            slopes[i, j] = 3.0 * rate
 
 
-def bends(knots: Array) -> Array:
-    """Return B with |B c|^2 the integral of theta'''^2, constant between knots."""
+def penalty_on_bends(knots: Array) -> Array:
+    """Return P with c^T P c the integral of theta'''^2, constant between knots."""
     low, high = knots[_DEGREE:-_DEGREE - 1], knots[_DEGREE + 1:-_DEGREE]  # fmt: skip
     real = high > low
     low, length = low[real], (high - low)[real]
     # Second differences of theta' at points well inside, where no knot is in doubt.
     inner = low[:, None] + length[:, None] * np.array([0.1, 0.5, 0.9])
-    _, slopes = design(knots, inner.ravel())
-    first, middle, last = slopes.reshape(len(low), 3, -1).transpose(1, 0, 2)
-    bend = (first - 2.0 * middle + last) / (0.4 * length[:, None]) ** 2
-    return np.asarray(bend * np.sqrt(length)[:, None])
+    basis = design(knots, inner.ravel())
+    a, b, c = basis.slope.reshape(len(low), 3, 4).transpose(1, 0, 2)
+    bend = (a - 2.0 * b + c) / (0.4 * length[:, None]) ** 2
+    penalty = np.zeros((len(knots) - 4, len(knots) - 4))
+    add_squares(basis.first[::3], bend, length, penalty)
+    return penalty
+
+
+@njit(cache=True)
+def add_squares(
+    first: NDArray[np.int64], rows: Array, weight: Array, normal: Array
+) -> None:
+    """Add R^T W R; a row of R holds `rows` from column `first` on, else zeros."""
+    for i in range(first.size):
+        for j in range(rows.shape[1]):
+            share = weight[i] * rows[i, j]
+            for k in range(rows.shape[1]):
+                normal[first[i] + j, first[i] + k] += share * rows[i, k]
