@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.jit import njit
-from .centreline_fit import fit_curve
+from .centreline_fit import SHARED, fit_curve
 from .curve import Curve
 from .edges import SHADED_LEVEL, STEP_PX, _bilinear, rough_edges
 
@@ -22,6 +22,9 @@ Image = NDArray[np.float32]
 
 _RECENT = 12
 """Centres from which the next one is predicted."""
+
+_GRID_PX = 3.0
+"""Distance of points along a rough curve."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,7 +66,7 @@ def start_curve(
     Start or None
         None where no two edges are seen along most of the curve.
     """
-    _, along, theta = _resample(points, 0.6 * width)
+    s, along, theta = _resample(points, 0.6 * width)
     normals = np.column_stack([-np.sin(theta), np.cos(theta)])
     low, high, dark, level = rough_edges(
         grey, along, normals, reach=0.5 * width + 6.0, sign=sign
@@ -77,7 +80,7 @@ def start_curve(
     if good.sum() < 0.5 * len(across):
         return None
     centre = along + (0.5 * (low + high))[:, None] * normals
-    centres = centre[good][:: max(1, int(0.4 * real))]
+    centres = centre[good][:: max(1, round(0.4 * real / s[1]))]
     if follow:
         centres = _follow(grey, centres[2:], real, sign, dark, level)
     centres = _follow(grey, centres[::-1], real, sign, dark, level)[::-1]
@@ -85,11 +88,11 @@ def start_curve(
 
 
 def smooth_curve(points: Array, *, spacing: float) -> Curve:
-    """Fit a curve to a coarse polyline, on an even grid of about 1 px."""
+    """Fit a curve to a coarse polyline."""
     s, even, theta = _resample(points, 0.25 * spacing)
     fit = fit_curve(
         s, even, np.ones(len(s)), spacing=spacing, iterations=2, theta=theta,
-        stiffness=0.1 * spacing**5,
+        stiffness=0.1 * spacing**5, shared=SHARED / s[1],
     )  # fmt: skip
     return fit.curve
 
@@ -99,9 +102,9 @@ def _resample(points: Array, window: float) -> tuple[Array, Array, Array]:
     steps = np.hypot(*np.diff(points, axis=0).T)
     points = points[np.concatenate([[True], steps > 1e-6])]
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    s = np.linspace(0.0, along[-1], max(int(along[-1]), 16) + 1)
+    s = np.linspace(0.0, along[-1], max(int(along[-1] / _GRID_PX), 100) + 1)
     even = np.column_stack([np.interp(s, along, points[:, k]) for k in (0, 1)])
-    index, reach = np.arange(len(s)), max(1, int(window))
+    index, reach = np.arange(len(s)), max(1, round(window / s[1]))
     chord = even[np.minimum(index + reach, len(s) - 1)]
     chord = chord - even[np.maximum(index - reach, 0)]
     return s, even, np.unwrap(np.arctan2(chord[:, 1], chord[:, 0]))
