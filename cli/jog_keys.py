@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-import queue
-import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import typer
 
 from ..core.errors import RigError
+from .keyboard import END, Keyboard, has_keys
 
 if TYPE_CHECKING:
     from ..rig.gap_stage import GapStage
@@ -19,11 +18,11 @@ if TYPE_CHECKING:
 STEPS_MM = {"1": 0.1, "2": 0.5, "3": 1.0, "4": 5.0, "5": 10.0}
 FARTHER = {"up", "right", "+", "k"}
 NEARER = {"down", "left", "-", "j"}
-_HELP = (
-    "up/right farther, down/left nearer, 1-5 step 0.1 0.5 1 5 10 mm, H home, "
-    "space stop, q quit"
-)
-_ESCAPES = {"[A": "up", "[B": "down", "[C": "right", "[D": "left"}
+QUIT = {"q", "\x03", END}
+_HELP = """\
+up, right: farther   down, left: nearer   1 to 5: steps of 0.1, 0.5, 1, 5, 10 mm
+H: home   space: stop   q: quit"""
+_WIDTH = 60
 
 
 def jog_loop(stage: GapStage) -> None:
@@ -32,55 +31,62 @@ def jog_loop(stage: GapStage) -> None:
     Raises
     ------
     RigError
-        If there is no terminal to read keys from.
+        If there is no terminal to read keys from, or the link to the stage is lost.
     """
-    if not sys.stdin.isatty():
+    if not has_keys():
         raise RigError(
             "jogging needs a terminal with keys; in a script use magbend rig goto GAP"
         )
     typer.echo(_HELP)
-    with _keys() as keys:
-        step_mm = 1.0
-        while True:
-            _show(stage, step_mm)
-            try:
-                key = keys.get(timeout=0.5)
-            except queue.Empty:
-                continue
-            if key in ("q", "\x03"):
-                typer.echo("")
-                return
-            step_mm = STEPS_MM.get(key, step_mm)
-            _act(stage, key, step_mm, keys)
+    step_mm = 1.0
+    try:
+        with Keyboard() as keyboard:
+            while True:
+                _show_status(stage, step_mm)
+                key = keyboard.key(0.5)
+                if key in QUIT:
+                    return
+                step_mm = STEPS_MM.get(key, step_mm)
+                _act(stage, key, step_mm, keyboard)
+    except KeyboardInterrupt:
+        return  # nothing moves while the loop waits for a key
+    finally:
+        typer.echo("")
 
 
-def _act(stage: GapStage, key: str, step_mm: float, keys: queue.Queue[str]) -> None:
+def _act(stage: GapStage, key: str, step_mm: float, keyboard: Keyboard) -> None:
     try:
         if key == "H":
-            stage.home()
+            _show("homing; space stops it")
+            with _space_stops(stage, keyboard):
+                stage.home()
         elif key in FARTHER | NEARER:
             here_mm = stage.status().gap_mm
             if here_mm is None:
                 raise RigError("the gap is not known; press H to home the stage")
             sign = 1.0 if key in FARTHER else -1.0
-            with _space_stops(stage, keys):
-                stage.goto_gap(here_mm + sign * step_mm, moved=_live(step_mm))
+            with _space_stops(stage, keyboard):
+                stage.goto_gap(
+                    here_mm + sign * step_mm,
+                    moved=lambda gap_mm: _show(
+                        f"gap {gap_mm:8.3f} mm  moving  step {step_mm:g} mm"
+                    ),
+                )
     except KeyboardInterrupt:
-        typer.echo(f"\rstopped; the position is {stage.position_state}" + " " * 20)
+        _show(f"stopped; the position is {stage.position_state}\n")
     except RigError as error:
-        typer.echo(f"\r{error}" + " " * 10)
+        _show(f"{error}\n")
 
 
 @contextlib.contextmanager
-def _space_stops(stage: GapStage, keys: queue.Queue[str]) -> Iterator[None]:
+def _space_stops(stage: GapStage, keyboard: Keyboard) -> Iterator[None]:
     """While the stage moves, a space bar (or q) asks it to stop."""
     done = threading.Event()
 
     def watch() -> None:
         while not done.is_set():
-            with contextlib.suppress(queue.Empty):
-                if keys.get(timeout=0.05) in (" ", "q", "\x03"):
-                    stage.request_stop()
+            if keyboard.key(0.05) in QUIT | {" "}:
+                stage.request_stop()
 
     watcher = threading.Thread(target=watch, daemon=True)
     watcher.start()
@@ -91,84 +97,13 @@ def _space_stops(stage: GapStage, keys: queue.Queue[str]) -> Iterator[None]:
         watcher.join()
 
 
-def _show(stage: GapStage, step_mm: float) -> None:
+def _show_status(stage: GapStage, step_mm: float) -> None:
     status = stage.status()
     where = "unknown" if status.gap_mm is None else f"{status.gap_mm:8.3f} mm"
-    typer.echo(
-        f"\rgap {where}  {status.state} {status.position_state}  "
-        f"step {step_mm:g} mm   ",
-        nl=False,
-    )
+    _show(f"gap {where}  {status.state} {status.position_state}  step {step_mm:g} mm")
 
 
-def _live(step_mm: float) -> Callable[[float], None]:
-    def show(gap_mm: float) -> None:
-        typer.echo(f"\rgap {gap_mm:8.3f} mm  moving  step {step_mm:g} mm   ", nl=False)
-
-    return show
-
-
-@contextlib.contextmanager
-def _keys() -> Iterator[queue.Queue[str]]:
-    """Yield a queue of key names, read by a thread from the terminal."""
-    keys: queue.Queue[str] = queue.Queue()
-    ended = threading.Event()
-    if sys.platform == "win32":
-        reader = threading.Thread(target=_read_windows, args=(keys, ended), daemon=True)
-        reader.start()
-        try:
-            yield keys
-        finally:
-            ended.set()
-            reader.join()
-        return
-    import termios
-    import tty
-
-    descriptor = sys.stdin.fileno()
-    before = termios.tcgetattr(descriptor)
-    tty.setcbreak(descriptor)
-    reader = threading.Thread(target=_read_posix, args=(keys, ended), daemon=True)
-    reader.start()
-    try:
-        yield keys
-    finally:
-        ended.set()
-        reader.join()
-        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
-
-
-def _read_posix(keys: queue.Queue[str], ended: threading.Event) -> None:
-    import os
-    import select
-
-    descriptor = sys.stdin.fileno()
-    while not ended.is_set():
-        if not select.select([descriptor], [], [], 0.05)[0]:
-            continue
-        text = os.read(descriptor, 16).decode("utf-8", "replace")
-        if not text:
-            keys.put("q")
-            return
-        while text:
-            if text[0] == "\x1b" and text[1:3] in _ESCAPES:
-                keys.put(_ESCAPES[text[1:3]])
-                text = text[3:]
-            else:
-                keys.put(text[0])
-                text = text[1:]
-
-
-def _read_windows(keys: queue.Queue[str], ended: threading.Event) -> None:
-    import msvcrt  # type: ignore[import-not-found,unused-ignore]
-    import time
-
-    arrows = {"H": "up", "P": "down", "M": "right", "K": "left"}
-    while not ended.is_set():
-        if not msvcrt.kbhit():  # type: ignore[attr-defined,unused-ignore]
-            time.sleep(0.02)
-            continue
-        key = msvcrt.getwch()  # type: ignore[attr-defined,unused-ignore]
-        if key in ("\x00", "\xe0"):
-            key = arrows.get(msvcrt.getwch(), "")  # type: ignore[attr-defined,unused-ignore]
-        keys.put(key)
+def _show(text: str) -> None:
+    """Write over the present line."""
+    line, end, _ = text.partition("\n")
+    typer.echo(f"\r{line:<{_WIDTH}}{end}", nl=False)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-import os
 import signal
 import sys
 import threading
 from collections.abc import Iterator
 from types import FrameType
 from typing import TYPE_CHECKING
+
+from .keyboard import END, Keyboard, has_keys
 
 if TYPE_CHECKING:
     from ..rig.control import RunControl
@@ -42,46 +43,21 @@ def pausing(control: RunControl, *, keys: bool) -> Iterator[None]:
                 signal.SIGUSR1, lambda _number, _frame: control.toggle_pause()
             )
             undo.callback(signal.signal, signal.SIGUSR1, previous)
-        if keys and sys.stdin.isatty() and sys.stderr.isatty():
-            undo.enter_context(_single_keys())
-            threading.Thread(
-                target=_listen, args=(control, is_over), daemon=True, name="keys"
-            ).start()
+        if keys and has_keys() and sys.stderr.isatty():
+            listener = threading.Thread(
+                target=_listen,
+                args=(undo.enter_context(Keyboard()), control, is_over),
+                daemon=True,
+                name="keys",
+            )
+            listener.start()
         yield
 
 
-@contextlib.contextmanager
-def _single_keys() -> Iterator[None]:
-    """Read keys without Enter; Ctrl-C keeps its meaning."""
-    if os.name != "posix":
-        yield
-        return
-    import termios
-    import tty
-
-    descriptor = sys.stdin.fileno()
-    before = termios.tcgetattr(descriptor)
-    tty.setcbreak(descriptor)
-    try:
-        yield
-    finally:
-        termios.tcsetattr(descriptor, termios.TCSADRAIN, before)
-
-
-def _listen(control: RunControl, is_over: threading.Event) -> None:
+def _listen(keyboard: Keyboard, control: RunControl, is_over: threading.Event) -> None:
     while not is_over.is_set():
-        if _key(_POLL_S) in ("p", "P"):
+        key = keyboard.key(_POLL_S)
+        if key in ("p", "P"):
             control.toggle_pause()
-
-
-def _key(timeout_s: float) -> str:
-    if os.name == "posix":
-        import select
-
-        ready, _, _ = select.select([sys.stdin], [], [], timeout_s)
-        return os.read(sys.stdin.fileno(), 1).decode("latin-1") if ready else ""
-    import msvcrt
-    import time
-
-    time.sleep(timeout_s)
-    return msvcrt.getwch() if msvcrt.kbhit() else ""  # type: ignore[attr-defined,no-any-return]
+        elif key == END:
+            return

@@ -71,7 +71,9 @@ def run(
     seed: Seed = 1,
     as_json: Json = False,
 ) -> None:
-    """Carry a plan out: approach, settle, measure the field, photograph, record.
+    """Carry a plan out and record it.
+
+    At each gap: approach, settle, measure the field, photograph.
 
     Ctrl-C holds the stage and ends the run (again: at once); p pauses it, and so does
     the signal USR1 or a file named pause in the run folder. What was recorded stays:
@@ -98,7 +100,7 @@ def verify(
     run: Annotated[Path, typer.Argument(help="Run folder.")],
     as_json: Json = False,
 ) -> None:
-    """Check that every file of a run is present and unaltered."""
+    """Check that a run is whole and unaltered."""
     from ..rig.read_run import read_run
     from ..rig.verify import verify_run
 
@@ -142,10 +144,11 @@ def scan_field(
     seed: Seed = 1,
     as_json: Json = False,
 ) -> None:
-    """Read the field along the stage, the probe in place of the rod; fit the magnet.
+    """Read the field along the stage; fit the magnet.
 
-    Writes field.csv (gap_mm,flux_mT,sd_mT,n) and, with two good readings or more and a
-    magnet in the rig file, field.svg and the remanence.
+    The probe stands in place of the rod. Writes field.csv (gap_mm,flux_mT,sd_mT,n) and,
+    with two good readings or more and a magnet in the rig file, field.svg and the
+    remanence.
     """
     from ..rig.config import read_plan
 
@@ -173,7 +176,7 @@ def init(
         bool, typer.Option("--twin", help="Files that run on the computed bench.")
     ] = False,
 ) -> None:
-    """Write a commented rig, plan and specimen file to begin with."""
+    """Write commented rig, plan and specimen files."""
     from ..rig.template import write_templates
 
     for path in write_templates(folder, twin=twin):

@@ -70,7 +70,7 @@ def status(
     ] = False,
     log: LogOption = None,
 ) -> None:
-    """Say where the stage is, what it does, and how far it may go."""
+    """Say where the stage is and how far it may go."""
     import time
 
     with _connected(rig, port, log) as stage:
@@ -89,7 +89,10 @@ def status(
 
 
 def home(rig: RigOption = RIG, port: PortOption = None, log: LogOption = None) -> None:
-    """Find the reference of the stage by its switches (a stock build homes Z, X, Y)."""
+    """Home the stage by its switches.
+
+    A stock build homes Z first, then X and Y; Ctrl-C stops it at once.
+    """
     with _connected(rig, port, log) as stage:
         typer.echo("homing; Ctrl-C stops it at once", err=True)
         with _told_how_to_go_on(stage):
@@ -110,7 +113,10 @@ def goto(
     as_json: JsonOption = False,
     log: LogOption = None,
 ) -> None:
-    """Go to a gap, from the far side; Ctrl-C slows down and keeps the position."""
+    """Go to a gap, from the far side.
+
+    Ctrl-C slows down and keeps the position.
+    """
     import dataclasses
 
     with _connected(rig, port, log) as stage:
@@ -130,7 +136,10 @@ def goto(
 
 
 def jog(rig: RigOption = RIG, port: PortOption = None, log: LogOption = None) -> None:
-    """Move by keys, with the position on the screen: arrows, 1 to 5, h, space, q."""
+    """Move by keys, with the position on the screen.
+
+    Arrows move, 1 to 5 choose the step, H homes, space stops, q quits.
+    """
     from .jog_keys import jog_loop
 
     with _connected(rig, port, log) as stage:
@@ -138,7 +147,10 @@ def jog(rig: RigOption = RIG, port: PortOption = None, log: LogOption = None) ->
 
 
 def stop(rig: RigOption = RIG, port: PortOption = None) -> None:
-    """Stop the stage, also while another command or run holds its port."""
+    """Stop the stage, also from another terminal.
+
+    A run or command that holds the port is told, and holds the stage.
+    """
     from ..rig.clock import SystemClock
     from ..rig.stop_request import stop_from_outside
 
@@ -152,7 +164,10 @@ def unlock(
     yes: Annotated[bool, typer.Option("--yes", help="Do not ask.")] = False,
     log: LogOption = None,
 ) -> None:
-    """Lift an alarm without homing ($X): the stage may not know where it is."""
+    """Lift an alarm without homing; asks first.
+
+    This sends $X: the stage may not know where it is.
+    """
     with _connected(rig, port, log) as stage:
         before = stage.status()
         if before.state != "alarm":
@@ -174,13 +189,17 @@ def set_gap(
     port: PortOption = None,
     log: LogOption = None,
 ) -> None:
-    """Tell which gap the stage stands at now; written to gap_at_zero_mm."""
+    """Tell the measured gap at which the stage stands.
+
+    It is written to gap_at_zero_mm of the rig file.
+    """
     from ..rig.rig_file_edit import replace_gap_at_zero
 
     with _connected(rig, port, log) as stage:
         gap_at_zero_mm = stage.assume_gap(gap_mm)
         replace_gap_at_zero(rig, gap_at_zero_mm)
         typer.echo(f"{rig}: gap_at_zero_mm = {gap_at_zero_mm:.3f}")
+        typer.echo(_line(_facts(stage)))
 
 
 def twin(
@@ -188,7 +207,10 @@ def twin(
         Path | None, typer.Option("--state", help="Keep settings and position here.")
     ] = None,
 ) -> None:
-    """Offer a virtual GRBL board on a pseudo-terminal until Ctrl-C (Linux, macOS)."""
+    """Offer a virtual board on a pseudo-terminal.
+
+    It ends with Ctrl-C; Linux and macOS only, elsewhere use --port twin://.
+    """
     import time
 
     from ..rig.clock import SystemClock
@@ -206,8 +228,14 @@ def twin(
 
 
 def _tables(rig: Path, port: str | None) -> tuple[StageConfig, Any]:
+    from ..core.errors import ConfigError
     from ..rig.config import read_rig
 
+    if not rig.exists():
+        raise ConfigError(
+            f"{rig}: there is no such file; name yours with --rig, or write one: "
+            "magbend rig init"
+        )
     model = read_rig(rig)
     config = model.stage
     if port:

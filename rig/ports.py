@@ -56,9 +56,13 @@ def resolve_port(spec: str) -> str:
     if len(fitting) == 1:
         return fitting[0].device
     seen = ", ".join(port.device for port in ports) or "none"
+    if not fitting and spec == "auto":
+        raise StageError(
+            "there is no USB serial port: is the cable in, and does it carry data? "
+            "(stage.port is auto; a port of another kind must be named)"
+        )
     if not fitting:
-        what = "no USB serial port" if spec == "auto" else f"no port with {spec}"
-        raise StageError(f"there is {what}; USB serial ports here: {seen}")
+        raise StageError(f"there is no port with {spec}; USB serial ports here: {seen}")
     raise StageError(
         f"stage.port = {spec!r} fits more than one port ({seen}); name one of them"
     )
