@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.errors import CameraError
-from .clock import Clock
+from .clock import Check, Clock, go_on
 
 Image = NDArray[Any]
 """A picture, shape (h, w) or (h, w, 3) in OpenCV's blue-green-red order, as given."""
@@ -54,8 +54,10 @@ class Camera(Protocol):
         """Take note of the step that the next pictures belong to."""
         ...
 
-    def grab_after(self, time_s: float) -> Frame:
+    def grab_after(self, time_s: float, *, check: Check = go_on) -> Frame:
         """Return a picture that began to arrive after the monotonic time `time_s`.
+
+        `check` is called while it waits.
 
         Raises
         ------
@@ -80,7 +82,7 @@ class NoCamera:
     def at_step(self, index: int, gap_mm: float) -> None:
         """Do nothing."""
 
-    def grab_after(self, time_s: float) -> Frame:
+    def grab_after(self, time_s: float, *, check: Check = go_on) -> Frame:
         """Refuse.
 
         Raises
@@ -94,8 +96,12 @@ class NoCamera:
         """Do nothing."""
 
 
-def grab_median(camera: Camera, clock: Clock, frames: int) -> Frame:
+def grab_median(
+    camera: Camera, clock: Clock, frames: int, *, check: Check = go_on
+) -> Frame:
     """Return the pixel-wise median of `frames` successive new pictures.
+
+    `check` is called while it waits for them.
 
     Raises
     ------
@@ -105,7 +111,7 @@ def grab_median(camera: Camera, clock: Clock, frames: int) -> Frame:
     grabbed: list[Frame] = []
     after_s = clock.monotonic_s()
     for _ in range(frames):
-        frame = camera.grab_after(after_s)
+        frame = camera.grab_after(after_s, check=check)
         grabbed.append(frame)
         after_s = frame.arrival_s
     last = grabbed[-1]

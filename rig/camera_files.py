@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core.errors import CameraError
 from .camera import Frame, Image
-from .clock import Clock
+from .clock import Check, Clock, go_on, wait
 
 _SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm"}
 _POLL_S = 0.05
@@ -86,7 +86,7 @@ class FolderCamera:
         del gap_mm
         self._index = index
 
-    def grab_after(self, time_s: float) -> Frame:
+    def grab_after(self, time_s: float, *, check: Check = go_on) -> Frame:
         """Return the picture of the present step, as if it were taken now.
 
         Raises
@@ -100,7 +100,8 @@ class FolderCamera:
                 f"{len(self._paths)} and step {self._index} was asked for"
             )
         image = read_image(self._paths[self._index])
-        self._clock.sleep(max(time_s - self._clock.monotonic_s(), 0.0) + _POLL_S)
+        wait_s = max(time_s - self._clock.monotonic_s(), 0.0) + _POLL_S
+        wait(self._clock, wait_s, check)
         self._number += 1
         return _frame(image, self._clock, self._number)
 
@@ -128,7 +129,7 @@ class WatchedFolderCamera:
         del index, gap_mm
         self._seen = set(list_images(self._folder))
 
-    def grab_after(self, time_s: float) -> Frame:
+    def grab_after(self, time_s: float, *, check: Check = go_on) -> Frame:
         """Return a picture that was saved after this call, once it is whole.
 
         Raises
@@ -138,6 +139,7 @@ class WatchedFolderCamera:
         """
         deadline_s = max(time_s, self._clock.monotonic_s()) + self._timeout_s
         while self._clock.monotonic_s() < deadline_s:
+            check()
             for path in list_images(self._folder):
                 if path not in self._seen and (image := self._whole(path)) is not None:
                     self._seen.add(path)
@@ -191,7 +193,7 @@ class VideoCamera:
     def at_step(self, index: int, gap_mm: float) -> None:
         """Take no note: the video goes on."""
 
-    def grab_after(self, time_s: float) -> Frame:
+    def grab_after(self, time_s: float, *, check: Check = go_on) -> Frame:
         """Return the next frame of the video.
 
         Raises
@@ -202,7 +204,8 @@ class VideoCamera:
         is_read, image = self._capture.read()
         if not is_read:
             raise CameraError(f"{self._path}: the video is over")
-        self._clock.sleep(max(time_s - self._clock.monotonic_s(), 0.0) + self._frame_s)
+        wait_s = max(time_s - self._clock.monotonic_s(), 0.0) + self._frame_s
+        wait(self._clock, wait_s, check)
         self._number += 1
         return _frame(np.asarray(image), self._clock, self._number)
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..core.errors import CameraError
 from .camera import Frame, Image, brightness
-from .clock import Clock
+from .clock import Check, Clock, go_on
 from .config import CameraConfig
 
 logger = logging.getLogger(__name__)
@@ -149,8 +149,10 @@ class CaptureCamera:
         with self._changed:
             return self._state.newest
 
-    def grab_after(self, time_s: float) -> Frame:
+    def grab_after(self, time_s: float, *, check: Check = go_on) -> Frame:
         """Return the newest picture whose transfer began after `time_s` plus latency.
+
+        `check` is called ten times a second while it waits, outside the lock.
 
         Raises
         ------
@@ -160,8 +162,9 @@ class CaptureCamera:
         fresh_s = time_s + self._config.latency_s
         timeout_s = self._config.frame_timeout_s
         deadline_s = max(self._clock.monotonic_s(), fresh_s) + timeout_s
-        with self._changed:
-            while True:
+        while True:
+            check()
+            with self._changed:
                 state = self._state
                 if state.newest is not None and state.began_s >= fresh_s:
                     return state.newest

@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from typing import Protocol
 
 from ..core.checks import positive
+
+
+Check = Callable[[], None]
+"""Called in every wait, some ten times a second; it raises to end the wait."""
+
+_SLICE_S = 0.1
+
+
+def go_on() -> None:
+    """End no wait."""
 
 
 class Clock(Protocol):
@@ -23,6 +34,14 @@ class Clock(Protocol):
     def sleep(self, duration_s: float) -> None:
         """Let `duration_s` seconds of this clock pass."""
         ...
+
+
+def wait(clock: Clock, duration_s: float, check: Check = go_on) -> None:
+    """Let `duration_s` seconds of a clock pass, calling `check` all the while."""
+    end_s = clock.monotonic_s() + duration_s
+    while (left_s := end_s - clock.monotonic_s()) > 0.0:
+        check()
+        clock.sleep(min(left_s, _SLICE_S))
 
 
 class SystemClock:

@@ -6,6 +6,8 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
+from .clock import Check, go_on
+
 PAUSE_FILE = "pause"
 _POLL_S = 0.05
 
@@ -42,9 +44,7 @@ class RunControl:
         else:
             self._asked.set()
 
-    def wait_while_paused(
-        self, report: Report, *, check: Callable[[], None] = lambda: None
-    ) -> bool:
+    def wait_while_paused(self, report: Report, *, check: Check = go_on) -> bool:
         """Wait until nobody asks for a pause; return whether there was one.
 
         `check` is called all the while; it may raise, to end the wait.

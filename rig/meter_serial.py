@@ -15,6 +15,7 @@ from typing import Any
 import serial
 
 from ..core.errors import MeterError
+from .clock import Check, go_on
 from .meter import Flux, Sample, combine
 from .meter_description import MeterDescription
 from .meter_parse import parse_multiplier, parse_reply, parse_unit
@@ -68,6 +69,7 @@ class SerialMeter:
         self._tap = tap
         self._last_s = 0.0
         self._buffer = b""
+        self._check: Check = go_on
         self._device: Any = self._open()
         try:
             for command in description.setup:
@@ -90,8 +92,12 @@ class SerialMeter:
             "replies": self._replies,
         }
 
-    def read_flux(self, samples: int, *, gap_mm: float) -> Flux:
+    def read_flux(
+        self, samples: int, *, gap_mm: float, check: Check = go_on
+    ) -> Flux:
         """Return the flux density now, from `samples` new readings.
+
+        `check` is called while it waits for them.
 
         Raises
         ------
@@ -99,6 +105,7 @@ class SerialMeter:
             If the port is lost, or the unit was changed to one that is not known.
         """
         del gap_mm
+        self._check = check
         self._unit = self._ask_unit(self._unit)
         readings: list[Sample] = []
         for _ in range(samples):
@@ -249,6 +256,7 @@ class SerialMeter:
 
     def _receive(self) -> bytes:
         """Return what is there, or wait one slice for a first byte."""
+        self._check()
         try:
             data = bytes(self._device.read(max(self._device.in_waiting, 1)))
         except (OSError, serial.SerialException, TypeError) as error:

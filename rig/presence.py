@@ -43,15 +43,19 @@ class Presence:
         real = os.path.realpath(port) if port.startswith("/") else port
         digest = hashlib.sha256(real.encode()).hexdigest()[:12]
         self._stem = runtime_folder() / f"magbend-stage-{digest}"
+        self._is_owner = False
+        self._is_stop_asked = False
 
     def claim(self) -> None:
         """Say that this process holds the port; old requests to stop are void."""
         self.clear_stop()
+        self._is_owner = True
         with contextlib.suppress(OSError):
             write_text(self._owner_file, json.dumps({"pid": os.getpid()}))
 
     def release(self) -> None:
         """Say that nobody holds the port."""
+        self._is_owner = False
         if self.owner() == os.getpid():
             self._owner_file.unlink(missing_ok=True)
         self.clear_stop()
@@ -62,15 +66,22 @@ class Presence:
         return pid if isinstance(pid, int) and _alive(pid) else None
 
     def ask_to_stop(self) -> None:
-        """Ask the owner to stop the stage; it looks ten times a second."""
-        write_text(self._stop_file, "stop\n")
+        """Ask the owner to stop the stage; it looks ten times a second.
+
+        The owner itself only sets a flag: it may do so in a signal handler.
+        """
+        if self._is_owner:
+            self._is_stop_asked = True
+        else:
+            write_text(self._stop_file, "stop\n")
 
     def stop_asked(self) -> bool:
         """Return whether a stop is asked for."""
-        return self._stop_file.exists()
+        return self._is_stop_asked or self._stop_file.exists()
 
     def clear_stop(self) -> None:
         """Take the request back: it has been met, or is void."""
+        self._is_stop_asked = False
         with contextlib.suppress(OSError):
             self._stop_file.unlink(missing_ok=True)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..core.errors import StageError
 from .camera import grab_median
+from .clock import Check, go_on
 from .config import Plan
 from .devices import Devices
 from .records import Record
@@ -16,7 +17,9 @@ _TOLERANCE = 0.01
 _SIGMAS = 4.0
 
 
-def verify_position(plan: Plan, devices: Devices, folder: Path, last: Record) -> Record:
+def verify_position(
+    plan: Plan, devices: Devices, folder: Path, last: Record, *, check: Check = go_on
+) -> Record:
     """Return to the last finished step and compare the field with what was recorded.
 
     Parameters
@@ -29,6 +32,8 @@ def verify_position(plan: Plan, devices: Devices, folder: Path, last: Record) ->
         The run folder, for the photograph of that step.
     last : dict
         Record of the last finished step.
+    check : callable
+        Called in every wait; it may raise, to end it.
 
     Returns
     -------
@@ -45,10 +50,14 @@ def verify_position(plan: Plan, devices: Devices, folder: Path, last: Record) ->
     gap_mm = float(last["gap_mm"])
     move = devices.stage.goto_gap(gap_mm)
     devices.camera.at_step(int(last["index"]), gap_mm)
-    settle(devices.camera, devices.clock, plan.settle)
-    flux = devices.meter.read_flux(plan.model.flux.samples, gap_mm=gap_mm)
-    frame = grab_median(devices.camera, devices.clock, plan.model.photograph.frames)
-    check: Record = {
+    settle(devices.camera, devices.clock, plan.settle, check=check)
+    flux = devices.meter.read_flux(
+        plan.model.flux.samples, gap_mm=gap_mm, check=check
+    )
+    frame = grab_median(
+        devices.camera, devices.clock, plan.model.photograph.frames, check=check
+    )
+    compared: Record = {
         "index": last["index"],
         "gap_mm": gap_mm,
         "stage_mm": move.stage_mm,
@@ -67,7 +76,7 @@ def verify_position(plan: Plan, devices: Devices, folder: Path, last: Record) ->
                 f"received {flux.flux_mT:.2f} mT: the stage, the magnet or the probe "
                 f"was moved; start a new run"
             )
-    return check
+    return compared
 
 
 def _image_change(folder: Path, last: Record, image: object) -> float | None:

@@ -21,6 +21,7 @@ from .config import Plan
 from .control import Report, RunControl, quiet
 from .devices import Devices
 from .gap_stage import MoveRecord
+from .interrupts import Interrupts, StopAtOnce, interrupts
 from .manifest import make_manifest, require_same
 from .meter import Flux
 from .photo_flags import photo_flags
@@ -102,18 +103,25 @@ def run(
         If the folder cannot be begun or resumed; nothing moved.
     StageError
         If a gap of the plan is refused; nothing moved.
+
+    Notes
+    -----
+    While it runs, in the main thread, the first Ctrl-C (or SIGTERM, or SIGHUP) asks
+    the run to stop, and the second one stops the stage at once (see `interrupts`).
     """
     for gap_mm in plan.gaps_mm:
         devices.stage.check_gap(gap_mm)
-    manifest = make_manifest(plan, devices, twin=twin)
-    is_resumed = resume and is_run(out)
-    if is_resumed:
-        require_same(read_run(out).manifest, manifest)
-        folder = RunFolder.reopen(out)
-    else:
-        folder = RunFolder.create(out, manifest, plan.text)
-    session = _Session(plan, devices, folder, control or RunControl(out), report)
-    status, reason = session.carry_out(is_resumed, progress)
+    with interrupts(devices.stage.request_stop) as received:
+        manifest = make_manifest(plan, devices, twin=twin)
+        is_resumed = resume and is_run(out)
+        if is_resumed:
+            require_same(read_run(out).manifest, manifest)
+            folder = RunFolder.reopen(out)
+        else:
+            folder = RunFolder.create(out, manifest, plan.text)
+        control = control or RunControl(out)
+        session = _Session(plan, devices, folder, control, report, received)
+        status, reason = session.carry_out(is_resumed, progress)
     return RunSummary(
         path=out, status=status, reason=reason, steps_done=len(folder.done),
         steps_total=len(plan.gaps_mm), flagged=tuple(session.flagged),
@@ -130,12 +138,14 @@ class _Session:
         folder: RunFolder,
         control: RunControl,
         report: Report,
+        received: Interrupts,
     ) -> None:
         self.plan = plan
         self.devices = devices
         self.folder = folder
         self.control = control
         self.report = report
+        self.received = received
         self.flagged: list[str] = []
         self.reference_brightness: float | None = None
 
@@ -143,10 +153,15 @@ class _Session:
         """Take every missing step; return status and reason of the ending."""
         status, reason = "success", "every step of the plan was taken"
         try:
-            self._prepare(is_resumed)
-            self._take_steps(progress)
+            with self.received.striking():
+                self._prepare(is_resumed)
+                self._take_steps(progress)
+        except StopAtOnce:
+            status, reason = "abort", f"stopped at once by {self.received.name}"
         except (KeyboardInterrupt, StoppedError) as stop:
             status, reason = "abort", str(stop) or "stopped by the operator"
+            if self.received.name:
+                reason = f"stopped by {self.received.name}"
         except MagbendError as error:
             status, reason = "fail", str(error)
         except BaseException as error:
@@ -166,7 +181,9 @@ class _Session:
             last = steps[-1]
             self.reference_brightness = steps[0].get("brightness")
             self.report(f"checking the position at {last['gap_mm']:g} mm")
-            check = verify_position(self.plan, self.devices, self.folder.path, last)
+            check = verify_position(
+                self.plan, self.devices, self.folder.path, last, check=self._check
+            )
             self.folder.start_session({"position_check": check})
 
     def _take_steps(self, progress: Progress) -> None:
@@ -187,11 +204,16 @@ class _Session:
         devices.camera.at_step(index, gap_mm)
         was_paused = self._pause() or was_paused
         settled = settle(
-            devices.camera, devices.clock, plan.settle, check=self._require_no_stop
+            devices.camera, devices.clock, plan.settle, check=self._check
         )
-        flux = devices.meter.read_flux(plan.model.flux.samples, gap_mm=gap_mm)
-        frame = grab_median(devices.camera, devices.clock, plan.model.photograph.frames)
-        self._require_no_stop()
+        flux = devices.meter.read_flux(
+            plan.model.flux.samples, gap_mm=gap_mm, check=self._check
+        )
+        frame = grab_median(
+            devices.camera, devices.clock, plan.model.photograph.frames,
+            check=self._check,
+        )  # fmt: skip
+        self._check()
         self._require_standing(move)
         level = brightness(frame.image)
         if self.reference_brightness is None:
@@ -226,10 +248,10 @@ class _Session:
         )
 
     def _pause(self) -> bool:
-        return self.control.wait_while_paused(self.report, check=self._require_no_stop)
+        return self.control.wait_while_paused(self.report, check=self._check)
 
-    def _require_no_stop(self) -> None:
-        """End the run if another terminal asked for it while the stage stands."""
+    def _check(self) -> None:
+        """End the run if somebody asked for it while the stage stands."""
         if self.devices.stage.stop_requested():
             raise StoppedError("the run was stopped by magbend rig stop")
 
@@ -253,15 +275,10 @@ class _Session:
             )
 
     def _end(self, status: str, reason: str) -> str:
-        """Hold the stage and write the ending; a second Ctrl-C cuts both short."""
+        """Bring the stage to a stand and write the ending, whatever happens."""
         stage = self.devices.stage
-        if status != "success":
-            try:
-                with _best_effort("holding the stage"):
-                    stage.hold()
-            except KeyboardInterrupt:
-                with _best_effort("stopping the stage"):
-                    stage.stop()
+        if status != "success" or stage.stop_requested():
+            self._halt()
         try:
             self.folder.finish(status, reason)
         except MagbendError as error:
@@ -275,6 +292,17 @@ class _Session:
                 stage.abort("retract")
         return reason
 
+    def _halt(self) -> None:
+        """Hold the stage; a further Ctrl-C stops it at once, one more gives that up."""
+        stage = self.devices.stage
+        for halt in (stage.hold, stage.stop):
+            try:
+                with self.received.striking(), _best_effort("stopping the stage"):
+                    halt()
+                    return
+            except KeyboardInterrupt:
+                continue
+
 
 @contextlib.contextmanager
 def _best_effort(what: str) -> Iterator[None]:
@@ -282,6 +310,8 @@ def _best_effort(what: str) -> Iterator[None]:
         yield
     except RigError as error:
         logger.warning("%s failed: %s", what, error)
+    except Exception:  # the ending must be written even so
+        logger.exception("%s failed", what)
 
 
 def _step_flags(move: MoveRecord, settled: Settled, flux: Flux) -> list[str]:

@@ -12,7 +12,6 @@ a slow swing moves little between neighbours, most of all at its turning points.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..core.errors import CameraError
 from .camera import Camera, Frame, Image
-from .clock import Clock
+from .clock import Check, Clock, go_on, wait
 from .config import SettleConfig
 
 _FLOOR = 0.04
@@ -123,7 +122,7 @@ def settle(
     clock: Clock,
     config: SettleConfig,
     *,
-    check: Callable[[], None] = lambda: None,
+    check: Check = go_on,
 ) -> Settled:
     """Wait until the rod is still, or until the time is up.
 
@@ -136,7 +135,7 @@ def settle(
     config : SettleConfig
         Fixed time, threshold, number of pictures, time-out.
     check : callable
-        Called before each picture; it may raise, to end the wait.
+        Called ten times a second; it may raise, to end the wait.
 
     Returns
     -------
@@ -149,13 +148,12 @@ def settle(
         If no picture comes.
     """
     start_s = clock.monotonic_s()
-    clock.sleep(config.time_s)
+    wait(clock, config.time_s, check)
     judge = StillnessJudge(config)
     after_s = clock.monotonic_s()
     frames = 0
     while True:
-        check()
-        frame = camera.grab_after(after_s)
+        frame = camera.grab_after(after_s, check=check)
         frames += 1
         is_still = judge.is_still(frame)
         elapsed_s = clock.monotonic_s() - start_s

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from ...core.errors import CameraError
 from ..camera import Frame, Image
-from ..clock import Clock
+from ..clock import Check, Clock, go_on, wait
 
 CameraFault = Literal["stall", "dark"]
 Render = Callable[[float, float], Image]
@@ -74,7 +74,7 @@ class VirtualCamera:
         del index, gap_mm
         self._arrived_s = self._clock.monotonic_s()
 
-    def grab_after(self, time_s: float) -> Frame:
+    def grab_after(self, time_s: float, *, check: Check = go_on) -> Frame:
         """Return the first picture that begins after `time_s`.
 
         Raises
@@ -83,11 +83,11 @@ class VirtualCamera:
             If a fault of the schedule keeps it from coming.
         """
         now_s = self._clock.monotonic_s()
-        self._clock.sleep(max(time_s - now_s, 0.0) + self._frame_s)
+        wait(self._clock, max(time_s - now_s, 0.0) + self._frame_s, check)
         self._number += 1
         fault = self._faults.get(self._number)
         if fault == "stall":
-            self._clock.sleep(self._timeout_s)
+            wait(self._clock, self._timeout_s, check)
             raise CameraError(
                 f"the twin camera must give a picture every {self._frame_s:g} s; "
                 f"instead none came for {self._timeout_s:g} s"

@@ -6,6 +6,7 @@ import random
 from collections.abc import Callable, Collection
 from typing import Any
 
+from ..clock import Check, go_on
 from ..meter import Flux, Sample, combine
 
 FluxAt = Callable[[float], float]
@@ -53,8 +54,11 @@ class VirtualMeter:
         """Return that it is the twin's."""
         return {"driver": "twin", "unit": "mT", "zero_mT": 0.0}
 
-    def read_flux(self, samples: int, *, gap_mm: float) -> Flux:
+    def read_flux(
+        self, samples: int, *, gap_mm: float, check: Check = go_on
+    ) -> Flux:
         """Return the flux density at the present gap with noise."""
+        check()
         is_silent = gap_mm in self._silent_gaps_mm
         return combine([self._sample(is_silent) for _ in range(samples)])
 

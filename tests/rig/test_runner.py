@@ -197,10 +197,10 @@ def test_a_lamp_that_fails_is_flagged(make_bench, tmp_path: Path) -> None:
 def test_a_photograph_during_motion_is_not_recorded(bench, tmp_path: Path) -> None:
     flux = bench.meter.read_flux
 
-    def push(samples: int, *, gap_mm: float):
+    def push(samples: int, *, gap_mm: float, **options):
         if gap_mm == 60.0:
             bench.raw.machine_mm += 0.5
-        return flux(samples, gap_mm=gap_mm)
+        return flux(samples, gap_mm=gap_mm, **options)
 
     bench.meter.read_flux = push
     summary = run(bench.plan, bench.devices, tmp_path / "out")

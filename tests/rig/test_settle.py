@@ -93,9 +93,9 @@ def test_every_picture_is_newer_than_the_fixed_time() -> None:
     asked: list[float] = []
 
     class Recorder(VirtualCamera):
-        def grab_after(self, time_s: float) -> Frame:
+        def grab_after(self, time_s: float, **options) -> Frame:
             asked.append(time_s)
-            return super().grab_after(time_s)
+            return super().grab_after(time_s, **options)
 
     generator = np.random.default_rng(6)
     camera = Recorder(lambda g, t: picture(60.0, generator), lambda: 1.0, clock)
