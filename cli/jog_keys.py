@@ -43,6 +43,8 @@ def jog_loop(stage: GapStage) -> None:
         with Keyboard() as keyboard:
             while True:
                 _show_status(stage, step_mm)
+                if stage.stop_requested():
+                    stage.hold()  # another terminal asked, and nothing moves
                 key = keyboard.key(0.5)
                 if key in QUIT:
                     return
@@ -80,7 +82,9 @@ def _act(stage: GapStage, key: str, step_mm: float, keyboard: Keyboard) -> None:
 
 @contextlib.contextmanager
 def _space_stops(stage: GapStage, keyboard: Keyboard) -> Iterator[None]:
-    """While the stage moves, a space bar (or q) asks it to stop."""
+    """While the stage moves, a space bar (or q, or Ctrl-C) asks it to stop."""
+    from ..rig.interrupts import interrupts
+
     done = threading.Event()
 
     def watch() -> None:
@@ -91,7 +95,8 @@ def _space_stops(stage: GapStage, keyboard: Keyboard) -> Iterator[None]:
     watcher = threading.Thread(target=watch, daemon=True)
     watcher.start()
     try:
-        yield
+        with interrupts(stage.request_stop) as received, received.striking():
+            yield
     finally:
         done.set()
         watcher.join()

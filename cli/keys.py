@@ -33,6 +33,16 @@ def terminating() -> Iterator[None]:
 
 
 @contextlib.contextmanager
+def answering() -> Iterator[None]:
+    """Let Ctrl-C and SIGTERM end a prompt at once: nothing else is going on."""
+    with contextlib.ExitStack() as undo:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            previous = signal.signal(number, signal.default_int_handler)
+            undo.callback(signal.signal, number, previous)
+        yield
+
+
+@contextlib.contextmanager
 def pausing(control: RunControl, *, keys: bool) -> Iterator[None]:
     """Let the signal USR1, and the key p if `keys`, pause the run and let it go on."""
     is_over = threading.Event()

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from ..core.errors import StoreError
+from .keys import answering
 
 if TYPE_CHECKING:
     from ..rig.clock import Clock
@@ -31,12 +32,24 @@ def asks_flux(plan: Plan, readings_mT: dict[float, float] | None) -> bool:
 
 
 def ask_flux(gap_mm: float) -> float | None:
-    """Ask for the reading of a hand meter; Enter means that there is none."""
+    """Ask for the reading of a hand meter; Enter means that there is none.
+
+    Raises
+    ------
+    StoppedError
+        On Ctrl-C.
+    """
+    from ..rig.stage import StoppedError
+
     while True:
-        text = typer.prompt(
-            f"Tesla-meter at {gap_mm:g} mm, in mT (Enter: none)",
-            default="", show_default=False, err=True,
-        )  # fmt: skip
+        try:
+            with answering():
+                text = typer.prompt(
+                    f"Tesla-meter at {gap_mm:g} mm, in mT (Enter: none)",
+                    default="", show_default=False, err=True,
+                )  # fmt: skip
+        except typer.Abort:
+            raise StoppedError("stopped by Ctrl-C") from None
         if not text.strip():
             return None
         try:

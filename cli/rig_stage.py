@@ -85,6 +85,8 @@ def status(
                     print_json(data)
                 else:
                     typer.echo(_line(data))
+                if stage.stop_requested():
+                    stage.hold()
                 time.sleep(0.5)
 
 
@@ -121,10 +123,10 @@ def goto(
 
     with _connected(rig, port, log) as stage:
         stage.check_gap(gap_mm)
-        if home_first and stage.position_state != "homed":
-            typer.echo("homing; Ctrl-C stops it at once", err=True)
-            stage.home()
         with _told_how_to_go_on(stage):
+            if home_first and stage.position_state != "homed":
+                typer.echo("homing; Ctrl-C stops it at once", err=True)
+                stage.home()
             record = stage.goto_gap(gap_mm, feed_mm_min=feed_mm_min, moved=_ticker())
         if as_json:
             print_json(dataclasses.asdict(record))
@@ -266,14 +268,20 @@ def _connected(rig: Path, port: str | None, log: Path | None) -> Iterator[GapSta
 
 @contextlib.contextmanager
 def _told_how_to_go_on(stage: GapStage) -> Iterator[None]:
+    """Let Ctrl-C stop the stage, and say what its position is worth then."""
     from ..core.errors import RigError
+    from ..rig.interrupts import interrupts
+    from ..rig.stage import StoppedError
 
-    try:
-        yield
-    except KeyboardInterrupt:
-        kept = stage.position_state == "homed"
-        what = "the position was kept" if kept else "home it (magbend rig home)"
-        raise RigError(f"stopped by Ctrl-C; {what}") from None
+    with interrupts(stage.request_stop) as received:
+        try:
+            with received.striking():
+                yield
+        except (KeyboardInterrupt, StoppedError) as stop:
+            by = "Ctrl-C" if received.name == "SIGINT" else received.name
+            kept = stage.position_state == "homed"
+            what = "the position was kept" if kept else "home it (magbend rig home)"
+            raise RigError(f"stopped by {by}; {what}" if by else str(stop)) from None
 
 
 def _facts(stage: GapStage) -> dict[str, Any]:

@@ -9,7 +9,6 @@ from typing import Protocol
 
 from ..core.checks import positive
 
-
 Check = Callable[[], None]
 """Called in every wait, some ten times a second; it raises to end the wait."""
 

@@ -25,7 +25,7 @@ from .grbl_ready import (
 )
 from .grbl_session import CommandRefusedError, GrblSession
 from .link import Link
-from .serial_stage import MARGIN_S, SerialStage
+from .serial_stage import MARGIN_S, STOPPED, SerialStage
 from .stage import (
     AlarmError,
     InterlockError,
@@ -114,7 +114,7 @@ class GrblStage(SerialStage[GrblSession]):
     def _stop_homing_if_asked(self) -> None:
         if self.stop_requested():
             self.stop()
-            raise StoppedError("the stage was stopped by magbend rig stop")
+            raise StoppedError(STOPPED)
 
     def _standing_mm(self) -> float:
         report = self._wait_for_report(self._require_session())

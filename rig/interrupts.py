@@ -19,7 +19,7 @@ from types import FrameType
 _SAME_PRESS_S = 0.3
 
 
-class StopAtOnce(KeyboardInterrupt):  # noqa: N818 - an interrupt, not an error
+class StopAtOnce(KeyboardInterrupt):
     """A second Ctrl-C: no slowing down any more."""
 
 

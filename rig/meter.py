@@ -69,9 +69,7 @@ class Meter(Protocol):
         """What the manifest keeps: model, port, unit, zero offset, replies of setup."""
         ...
 
-    def read_flux(
-        self, samples: int, *, gap_mm: float, check: Check = go_on
-    ) -> Flux:
+    def read_flux(self, samples: int, *, gap_mm: float, check: Check = go_on) -> Flux:
         """Return the flux density now, from `samples` new readings.
 
         `check` is called while it waits for them.
@@ -123,9 +121,7 @@ class NoMeter:
         """Return that there is none."""
         return {"driver": "none"}
 
-    def read_flux(
-        self, samples: int, *, gap_mm: float, check: Check = go_on
-    ) -> Flux:
+    def read_flux(self, samples: int, *, gap_mm: float, check: Check = go_on) -> Flux:
         """Return a flux density of status ``none``."""
         del samples, gap_mm
         return Flux(status="none")
@@ -155,9 +151,7 @@ class ManualMeter:
         """Return that the readings were typed in."""
         return {"driver": "manual", "unit": "mT"}
 
-    def read_flux(
-        self, samples: int, *, gap_mm: float, check: Check = go_on
-    ) -> Flux:
+    def read_flux(self, samples: int, *, gap_mm: float, check: Check = go_on) -> Flux:
         """Return the typed reading of this gap, else a status ``none``."""
         del samples
         flux_mT = self._flux_mT.get(gap_mm)

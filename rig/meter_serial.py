@@ -92,9 +92,7 @@ class SerialMeter:
             "replies": self._replies,
         }
 
-    def read_flux(
-        self, samples: int, *, gap_mm: float, check: Check = go_on
-    ) -> Flux:
+    def read_flux(self, samples: int, *, gap_mm: float, check: Check = go_on) -> Flux:
         """Return the flux density now, from `samples` new readings.
 
         `check` is called while it waits for them.

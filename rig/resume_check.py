@@ -51,9 +51,7 @@ def verify_position(
     move = devices.stage.goto_gap(gap_mm)
     devices.camera.at_step(int(last["index"]), gap_mm)
     settle(devices.camera, devices.clock, plan.settle, check=check)
-    flux = devices.meter.read_flux(
-        plan.model.flux.samples, gap_mm=gap_mm, check=check
-    )
+    flux = devices.meter.read_flux(plan.model.flux.samples, gap_mm=gap_mm, check=check)
     frame = grab_median(
         devices.camera, devices.clock, plan.model.photograph.frames, check=check
     )

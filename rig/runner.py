@@ -203,9 +203,7 @@ class _Session:
         move = devices.stage.goto_gap(gap_mm)
         devices.camera.at_step(index, gap_mm)
         was_paused = self._pause() or was_paused
-        settled = settle(
-            devices.camera, devices.clock, plan.settle, check=self._check
-        )
+        settled = settle(devices.camera, devices.clock, plan.settle, check=self._check)
         flux = devices.meter.read_flux(
             plan.model.flux.samples, gap_mm=gap_mm, check=self._check
         )

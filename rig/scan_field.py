@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..core.errors import RigError, StoreError
 from ..core.files import write_text
 from ..core.progress import Progress, silent
+from .clock import Check, wait
 from .control import Report, quiet
 from .devices import Devices
+from .gap_stage import GapStage
+from .interrupts import interrupts
 from .meter import Flux
+from .stage import StoppedError
 
 COLUMNS = "gap_mm,flux_mT,sd_mT,n"
 _COLUMNS_WITHOUT_SD = "gap_mm,flux_mT,n"
@@ -74,6 +79,8 @@ def scan_field(
     ------
     StoreError
         If ``field.csv`` is there already or cannot be written.
+    StoppedError
+        On Ctrl-C, SIGTERM or ``magbend rig stop``; the stage stands.
     StageError, MeterError
         If a device fails; the stage stands.
     """
@@ -81,16 +88,16 @@ def scan_field(
     for gap_mm in gaps_mm:
         stage.check_gap(gap_mm)
     path = _new_table(out)
-    if stage.position_state != "homed":
-        report("homing the stage")
-        stage.home()
     rows: list[tuple[float, Flux]] = []
     skipped: list[str] = []
-    try:
+    with _standing_at_the_end(stage, path) as check:
+        if stage.position_state != "homed":
+            report("homing the stage")
+            stage.home()
         for done, gap_mm in enumerate(gaps_mm, start=1):
             stage.goto_gap(gap_mm)
-            devices.clock.sleep(settle_s)
-            flux = devices.meter.read_flux(samples, gap_mm=gap_mm)
+            wait(devices.clock, settle_s, check)
+            flux = devices.meter.read_flux(samples, gap_mm=gap_mm, check=check)
             if flux.flux_mT is None:
                 skipped.append(f"{gap_mm:g} mm: {flux.status}")
                 report(f"gap {gap_mm:g} mm: no reading ({flux.status})")
@@ -99,9 +106,6 @@ def scan_field(
                 report(f"gap {gap_mm:g} mm: {_shown(flux)}")
             _write(path, rows)
             progress(done, len(gaps_mm))
-    except (KeyboardInterrupt, RigError):
-        stage.hold()
-        raise
     return FieldScan(
         path=path,
         gaps_mm=tuple(gap for gap, _ in rows),
@@ -109,6 +113,27 @@ def scan_field(
         sd_mT=tuple(flux.sd_mT for _, flux in rows),
         skipped=tuple(skipped),
     )
+
+
+@contextlib.contextmanager
+def _standing_at_the_end(stage: GapStage, path: Path) -> Iterator[Check]:
+    """Yield what every wait calls; whatever ends the scan, the stage stands."""
+    with interrupts(stage.request_stop) as received:
+
+        def check() -> None:
+            if stage.stop_requested():
+                raise StoppedError("the scan was stopped by magbend rig stop")
+
+        try:
+            with received.striking():
+                yield check
+        except (KeyboardInterrupt, RigError) as error:
+            stage.hold()
+            if received.name:
+                raise StoppedError(
+                    f"stopped by {received.name}; {path} holds what was read"
+                ) from error
+            raise
 
 
 def _new_table(out: Path) -> Path:

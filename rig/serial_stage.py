@@ -15,6 +15,7 @@ from typing import Generic, TypeVar
 
 from ..core.errors import StageError
 from .clock import Clock
+from .interrupts import StopAtOnce
 from .link import Link, WireLog
 from .ports import resolve_port
 from .position_trust import Counting, PositionTrust
@@ -34,6 +35,7 @@ from .stage_config import StageConfig
 logger = logging.getLogger(__name__)
 
 MARGIN_S = 5.0
+STOPPED = "the stage was stopped by magbend rig stop, a key or Ctrl-C"
 
 Session = TypeVar("Session", bound=Counting)
 
@@ -191,7 +193,7 @@ class SerialStage(ABC, Generic[Session]):
     def _hold_if_asked(self) -> None:
         if self.stop_requested():
             self.hold()
-            raise StoppedError("the stage was stopped by magbend rig stop")
+            raise StoppedError(STOPPED)
 
     @contextlib.contextmanager
     def _stand_if_interrupted(self, *, at_once: bool = False) -> Iterator[None]:
@@ -201,7 +203,8 @@ class SerialStage(ABC, Generic[Session]):
         """
         try:
             yield
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as interrupt:
+            at_once = at_once or isinstance(interrupt, StopAtOnce)
             try:
                 self.stop() if at_once else self.hold()
             except KeyboardInterrupt:

@@ -54,9 +54,7 @@ class VirtualMeter:
         """Return that it is the twin's."""
         return {"driver": "twin", "unit": "mT", "zero_mT": 0.0}
 
-    def read_flux(
-        self, samples: int, *, gap_mm: float, check: Check = go_on
-    ) -> Flux:
+    def read_flux(self, samples: int, *, gap_mm: float, check: Check = go_on) -> Flux:
         """Return the flux density at the present gap with noise."""
         check()
         is_silent = gap_mm in self._silent_gaps_mm

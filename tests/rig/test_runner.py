@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import cv2
@@ -101,22 +102,43 @@ def test_ctrl_c_in_each_phase_holds_and_ends_as_abort(
     assert len(read_run(out).steps) == (1 if phase == "move" else 0)
 
 
-@pytest.mark.parametrize("at", ["settle", "pause"])
-def test_rig_stop_ends_a_run_whose_stage_stands(bench, tmp_path, at: str) -> None:
+@pytest.mark.parametrize("phase", ["settle", "still picture", "stall", "pause"])
+def test_rig_stop_ends_a_run_whose_stage_stands_within_a_second(
+    make_bench, plan_file: Path, tmp_path: Path, phase: str
+) -> None:
+    text = plan_file.read_text()
+    if phase == "settle":
+        text = re.sub(r"\ntime_s = .*", "\ntime_s = 15.0", text)
+    plan_file.write_text(text)
+    camera = {
+        "stall": {"faults": {1: "stall"}, "timeout_s": 10.0},
+        "still picture": {"swing_mm": 4.0, "damping_s": 1e9},
+    }
+    bench = make_bench(camera=camera.get(phase))
     control = RunControl()
-    plain = bench.camera.at_step
+    asked_s = []
+    plain_step, plain_sleep = bench.camera.at_step, bench.clock.sleep
 
     def at_step(index: int, gap_mm: float) -> None:
-        plain(index, gap_mm)
-        bench.raw.request_stop()
-        if at == "pause":
+        plain_step(index, gap_mm)
+        asked_s.append(bench.clock.monotonic_s() + 1.5)
+        if phase == "pause":
+            bench.raw.request_stop()
             control.toggle_pause()
 
+    def sleep(duration_s: float) -> None:
+        plain_sleep(duration_s)
+        if asked_s and bench.clock.monotonic_s() >= asked_s[0]:
+            bench.raw.request_stop()
+
     bench.camera.at_step = at_step
+    bench.clock.sleep = sleep
     summary = run(bench.plan, bench.devices, tmp_path / "out", control=control)
     assert summary.status == "abort"
     assert "magbend rig stop" in summary.reason
-    assert bench.clock.monotonic_s() < 30.0
+    assert bench.clock.monotonic_s() < asked_s[0] + 1.0
+    assert len(asked_s) == 1
+    assert bench.raw.calls[-1] == "hold"
 
 
 def test_a_second_ctrl_c_stops_at_once(bench, tmp_path: Path) -> None:
