@@ -18,10 +18,10 @@ import numpy as np
 def is_warm() -> bool:
     """Return whether the largest kernels are in the cache, so that nothing compiles."""
     from ..sim.planar import solve_rows
-    from ..sim.solid_march import solve_from
+    from ..sim.solid_solve import solve_shape
     from ..vision.edges import _sample
 
-    for kernel in (solve_rows, solve_from, _sample):
+    for kernel in (solve_rows, solve_shape, _sample):
         cache = getattr(kernel.compiled, "_cache", None)
         folder = Path(getattr(cache, "cache_path", ""))
         if not any(folder.glob(f"*{kernel.__name__}-*.nbi")):

@@ -19,8 +19,10 @@ the gap; `docs/solid.md` tells what each is worth and how its constant was found
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +42,8 @@ from .fields import (
     UniformField,
 )  # fmt: skip
 from .magnet_field import cuboid_flux
-from .planar import GONE, ORDER, solve_planar
+from .planar import COARSE_ORDER as START_ORDER
+from .planar import GONE, solve_planar
 from .planar import STEP as PLAIN_STEP
 from .scaling import field_array, rod_array, stations, stiffness_Nmm2
 from .solid_march import (
@@ -50,7 +53,6 @@ from .solid_march import (
     RHO,
     SIDE,
     SOFT,
-    STEP,
     WIDTH,
     WX,
     WY,
@@ -59,9 +61,8 @@ from .solid_march import (
     H,
     M,
     T,
-    shape,
-    solve_from,
 )  # fmt: skip
+from .solid_solve import solve_shape
 
 Array = NDArray[np.float64]
 
@@ -69,9 +70,6 @@ LOAD_LIMIT = 900.0
 """Largest P L^2 / EI: beyond, tip angles are too close to the field for differences."""
 STRAIN_LIMIT = 0.1
 """Largest axial strain and half-thickness strain for which the expansion is used."""
-END_ZONE = 0.165
-END_SLOPE = 3.4
-"""Decay length in sides, and slope, of the axis's profile near a fixed face."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -182,124 +180,119 @@ def solve_solid(
     """
     support = support or Support()
     _refuse_spatial(field, support)
-    rod, base = solid_arrays(specimen, support, poisson_ratio)
-    flux = field_array(field, specimen.length_mm)
+    held = _held(specimen, support, poisson_ratio)
+    L = held.length_mm
+    flux = field_array(field, L)
     clamp = rad_from_deg(support.clamp_angle_deg)
-    tip, base, flux_tip_mT = _start(specimen, field, support, rod, base)
-    steps = np.ceil(rod[:, H] * np.sqrt(rod[:, E] * base[2]) / STEP) + 1.0
-    trails = np.zeros((3, int(steps.sum()), 3))
-    index, load, error, moment = solve_from(
-        rod, flux, base, clamp, tip, trails, np.zeros((4, 3))
+    outcome, _, limit, _, bx, by, moment, _, tip = solve_planar(
+        held.plain, flux, clamp, held.margin, stations(2), START_ORDER, PLAIN_STEP
+    )
+    if outcome > GONE:
+        from .solve import failure  # which calls this module
+
+        raise failure(outcome, specimen, field, limit)
+    load = held.magnetic * math.hypot(bx, by) + held.weight
+    _refuse_load(load * held.softest)
+    base = np.array([held.turn, held.shift, load])
+    if outcome == GONE:
+        tip[0] = math.nan
+    else:
+        _refuse_strain(held, load, moment)
+    s = stations(points)
+    table = np.empty((4, points))
+    index, limit, error, moment = solve_shape(
+        held.rod, flux, base, clamp, tip, s, table
     )
     if index < 0:
         return Solution(
-            centreline=None, status=PULLED_IN, morse_index=-1, error_mm=float("nan"),
-            flux_tip_mT=flux_tip_mT, root_moment_Nm=0.0, load_limit=load,
+            centreline=None, status=PULLED_IN, morse_index=-1, error_mm=math.nan,
+            flux_tip_mT=(mT_from_T(bx), mT_from_T(by)), root_moment_Nm=0.0,
+            load_limit=limit,
         )  # fmt: skip
-    s = stations(points)
-    table = np.empty((4, points))
-    shape(rod, flux, base, tip, s, table)
-    kappa = -rod[-1, E] * moment
-    _refuse_strain(rod, base, kappa)
-    _end_zone(table, s, clamp, kappa * base[1], float(rod[-1, SIDE]))
-    L = specimen.length_mm
-    centreline = Centreline(
-        s_mm=s * L, x_mm=table[0] * L, y_mm=table[1] * L,
-        theta_rad=table[2], kappa_per_mm=table[3] / L,
-    )  # fmt: skip
+    _refuse_strain(held, load, moment)
+    x, y, theta, kappa = table
+    centreline = Centreline._trusted(s * L, x * L, y * L, theta, kappa / L)
     return Solution(
         centreline=centreline,
         status=STABLE if index == 0 else UNSTABLE,
         morse_index=index,
         error_mm=error * L,
-        flux_tip_mT=_flux_mT(flux, table[0, -1], table[1, -1]),
-        root_moment_Nm=-moment * stiffness_Nmm2(specimen)[0] / L * 1e-3,
+        flux_tip_mT=_flux_mT(flux, x[-1], y[-1]),
+        root_moment_Nm=-moment * held.unit_Nm,
     )
 
 
+class _Held(NamedTuple):
+    """A held rod: its arrays (dimensionless, tip first) and what they come to."""
+
+    plain: Array
+    rod: Array
+    turn: float
+    shift: float
+    margin: float
+    magnetic: float
+    weight: float
+    softest: float
+    stretch: float
+    root: float
+    length_mm: float
+    unit_Nm: float
+
+
 @lru_cache(maxsize=256)
-def solid_arrays(
-    specimen: Specimen, support: Support, poisson_ratio: float
-) -> tuple[Array, Array]:
-    """Return rod (n, 13) and base (3,) as `solid_march` takes them."""
-    nu = poisson_ratio
-    constants = solid_constants(nu)
+def _held(specimen: Specimen, support: Support, poisson_ratio: float) -> _Held:
+    """Return what of a solve depends on the rod and its support alone.
+
+    `plain` is the rod as `planar_march` takes it, (n, 5), `rod` as `solid_march` does,
+    (n, 13). Then turn and shift of the base per root curvature; half the largest side;
+    the largest magnetic load per tesla, and the weight; the largest compliances in
+    bending and stretch; strain at the root's surface per moment; and the units.
+    """
+    constants = solid_constants(poisson_ratio)
     plain = rod_array(specimen, support)
-    sides = np.array(specimen.sides_mm[::-1]) / specimen.length_mm
-    moduli = np.array([section.E_MPa for section in specimen.sections[::-1]])
+    L = specimen.length_mm
+    sides = np.array(specimen.sides_mm[::-1]) / L
     rod = np.zeros((len(plain), WIDTH))
     rod[:, :T] = plain
     rod[:, T] = rod[:, E] * sides**2 / 12.0
-    rod[:, G] = rod[:, T] * 2.0 * (1.0 + nu) / constants.shear
+    rod[:, G] = rod[:, T] * 2.0 * (1.0 + poisson_ratio) / constants.shear
     rod[:, ALPHA] = 24.0 * constants.stretch_bow
     rod[:, RHO] = sides**2 / 12.0
     rod[:, CHI] = constants.soften * sides**2
     rod[:, SIDE] = sides
+    moduli = [section.E_MPa for section in specimen.sections[::-1]]
     for i in range(len(rod) - 1):
         if sides[i] == sides[i + 1]:
             low, high = sorted(moduli[i : i + 2])
-            rod[i, JOINT] = joint_turn(nu, low / high) * sides[i]
+            rod[i, JOINT] = joint_turn(poisson_ratio, low / high) * sides[i]
             rod[i, SOFT] = max(rod[i, E], rod[i + 1, E])
-    root = sides[-1]
-    base = np.array([constants.base_turn * root, constants.base_shift * root**2, 0.0])
-    return rod, base
-
-
-def _start(
-    specimen: Specimen, field: Field, support: Support, rod: Array, base: Array
-) -> tuple[Array, Array, tuple[float, float]]:
-    """Return the plain rod's tip (NaN if there is none), base with load, tip flux."""
-    flux = field_array(field, specimen.length_mm)
-    margin = 0.5 * float(rod[:, SIDE].max())
-    clamp = rad_from_deg(support.clamp_angle_deg)
-    outcome, _, load, _, bx, by, moment, _, tip = solve_planar(
-        rod_array(specimen, support),
-        flux,
-        clamp,
-        margin,
-        stations(2),
-        ORDER,
-        PLAIN_STEP,
+    return _Held(
+        plain=plain,
+        rod=rod,
+        turn=constants.base_turn * float(sides[-1]),
+        shift=constants.base_shift * float(sides[-1]) ** 2,
+        margin=0.5 * float(sides.max()),
+        magnetic=float(np.abs(rod[:, M]).max()),
+        weight=float(np.hypot(rod[:, WX], rod[:, WY]) @ rod[:, H]),
+        softest=float(rod[:, E].max()),
+        stretch=float(rod[:, T].max()),
+        root=float(rod[-1, E] * sides[-1]) / 2.0,
+        length_mm=L,
+        unit_Nm=stiffness_Nmm2(specimen)[0] / L * 1e-3,
     )
-    if outcome > GONE:
-        from .solve import failure  # which calls this module
 
-        raise failure(outcome, specimen, field, load)
-    weight = float(np.hypot(rod[:, WX], rod[:, WY]) @ rod[:, H])
-    load = float(np.abs(rod[:, M]).max() * np.hypot(bx, by)) + weight
-    highest = load * float(rod[:, E].max())
-    if highest > LOAD_LIMIT:
+
+def _refuse_load(load: float) -> None:
+    if load > LOAD_LIMIT:
         raise InputError(
             f"the load P L^2 / EI must be below {LOAD_LIMIT:g} for the solid model; "
-            f"instead received {highest:.3g}: use the plain rod"
+            f"instead received {load:.3g}: use the plain rod"
         )
-    base = np.array([base[0], base[1], load])
-    if outcome == GONE:
-        tip[0] = np.nan
-    else:
-        _refuse_strain(rod, base, float(rod[-1, E]) * moment)
-    return tip, base, (mT_from_T(bx), mT_from_T(by))
 
 
-def _end_zone(table: Array, s: Array, clamp: float, shift: float, side: float) -> None:
-    """Add the axis's own profile near the fixed face, which decays within a side.
-
-    From the same finite elements as the constants: the axis leaves the face at an
-    angle, since the face holds its points and not their slopes.
-    """
-    width = END_ZONE * side
-    t = s / width
-    decay = -shift * np.exp(-np.minimum(t, 700.0))
-    profile = decay * (1.0 + END_SLOPE * t)
-    table[0] -= np.sin(clamp) * profile
-    table[1] += np.cos(clamp) * profile
-    table[2] += decay * (END_SLOPE - 1.0 - END_SLOPE * t) / width
-    table[3] += decay * (1.0 - 2.0 * END_SLOPE + END_SLOPE * t) / width**2
-
-
-def _refuse_strain(rod: Array, base: Array, kappa: float) -> None:
-    stretch = base[2] * float(rod[:, T].max())
-    bending = abs(kappa) * float(rod[-1, SIDE]) / 2.0
+def _refuse_strain(held: _Held, load: float, moment: float) -> None:
+    stretch = load * held.stretch
+    bending = abs(moment) * held.root
     if max(stretch, bending) > STRAIN_LIMIT:
         raise InputError(
             f"strains must be below {STRAIN_LIMIT:g} for the solid model; instead "

@@ -24,9 +24,7 @@ import math
 import numpy as np
 
 from ..core.jit import njit
-from .magnet_field import cuboid_flux, inside
-from .planar import solve3
-from .planar_march import jacobi
+from .magnet_field import cuboid_flux
 
 H, E, M, WX, WY, T, G, ALPHA, RHO, CHI, SIDE, JOINT, SOFT = range(13)
 WIDTH = 13
@@ -35,7 +33,9 @@ SERIES = 11
 alpha t N + chi (e q)^2, and the increments of x and y."""
 ORDER = 14
 STEP = 0.35
-CONVERGED = 1e-11
+END_ZONE = 0.165
+END_SLOPE = 3.4
+"""Decay length in sides, and slope, of the axis's profile near a fixed face."""
 
 
 @njit(cache=True)
@@ -105,7 +105,8 @@ def _advance(h, order, X, S):  # type: ignore[no-untyped-def]
 def _load(rod, field, load, u, X, b):  # type: ignore[no-untyped-def]
     """Set the state at the tip: the traction m B / A, summed over the end face.
 
-    Four Gauss points carry the face's mean flux and its moment about the axis.
+    Four Gauss points carry the face's mean flux and its moment about the axis. Those
+    below the plane feel what those above feel.
     """
     cf, sf = math.cos(u[3]), math.sin(u[3])
     m = load * rod[0, M]
@@ -117,13 +118,11 @@ def _load(rod, field, load, u, X, b):  # type: ignore[no-untyped-def]
         a = rod[0, SIDE] / math.sqrt(12.0)
         nx, ny = -math.sin(u[0] + u[3]) * a, math.cos(u[0] + u[3]) * a
         fx = fy = 0.0
-        for i in range(4):
-            side = 1.0 if i % 2 == 0 else -1.0
-            up = a if i < 2 else -a
-            cuboid_flux(field[1:], u[1] + side * nx, u[2] + side * ny, up, b)
-            fx += 0.25 * m * b[0]
-            fy += 0.25 * m * b[1]
-            X[1] -= 0.25 * m * side * (nx * b[1] - ny * b[0])
+        for side in (-1.0, 1.0):
+            cuboid_flux(field[1:], u[1] + side * nx, u[2] + side * ny, a, b)
+            fx += 0.5 * m * b[0]
+            fy += 0.5 * m * b[1]
+            X[1] -= 0.5 * m * side * (nx * b[1] - ny * b[0])
     X[4], X[5] = cf * fx + sf * fy, cf * fy - sf * fx
 
 
@@ -143,6 +142,12 @@ def _cross(rod, field, load, i, u, X, b):  # type: ignore[no-untyped-def]
         cuboid_flux(field[1:], x, y, 0.0, b)
     X[4] += m * (cf * b[0] + sf * b[1])
     X[5] += m * (cf * b[1] - sf * b[0])
+
+
+@njit(cache=True)
+def steps_of(rod, i, base):  # type: ignore[no-untyped-def]
+    """Return how many steps section i takes."""
+    return max(1, math.ceil(rod[i, H] * math.sqrt(rod[i, E] * base[2]) / STEP))
 
 
 @njit(cache=True)
@@ -175,7 +180,7 @@ def march(rod, field, base, clamp, load, u, order, X, S, b, trail, miss):  # typ
     for i in range(rod.shape[0]):
         X[6] = load * (cf * rod[i, WX] + sf * rod[i, WY])
         X[7] = load * (cf * rod[i, WY] - sf * rod[i, WX])
-        n = max(1, math.ceil(rod[i, H] * math.sqrt(rod[i, E] * base[2]) / STEP))
+        n = steps_of(rod, i, base)
         h = rod[i, H] / n
         for _ in range(n):
             _series(h, order, X, rod[i], S)
@@ -195,170 +200,11 @@ def march(rod, field, base, clamp, load, u, order, X, S, b, trail, miss):  # typ
 
 
 @njit(cache=True)
-def columns(rod, field, base, clamp, load, u, X, S, b, trails, D):  # type: ignore[no-untyped-def]
-    """Fill D (4, 3) rows 0, 2, 3 with d(miss)/du by central differences.
-
-    `trails` (3, n, 3) receives the derivatives of the trail, for the Morse index. The
-    steps are 1e-6 of what turns the root by one: differences good to 1e-10.
-    """
-    stiff = 0.0
-    for i in range(rod.shape[0]):
-        stiff += rod[i, H] * math.sqrt(rod[i, E] * base[2])
-    up = np.zeros((trails.shape[1], 3))
-    down = np.zeros((trails.shape[1], 3))
-    plus, minus = np.zeros(3), np.zeros(3)
-    n = 0
-    for a in range(3):
-        step = 1e-5 / math.cosh(stiff) if a == 0 else 1e-5
-        if a > 0 and field[0] == 0.0:
-            D[0, a] = 0.0
-            D[2, a] = 1.0 if a == 1 else 0.0
-            D[3, a] = 1.0 if a == 2 else 0.0
-            trails[a, :, 0] = 0.0
-            trails[a, :, 1] = D[2, a]
-            trails[a, :, 2] = D[3, a]
-            continue
-        here = u[a]
-        u[a] = here + step
-        n = march(rod, field, base, clamp, load, u, ORDER, X, S, b, up, plus)
-        u[a] = here - step
-        march(rod, field, base, clamp, load, u, ORDER, X, S, b, down, minus)
-        u[a] = here
-        f = 0.5 / step
-        D[0, a] = f * (plus[0] - minus[0])
-        D[2, a] = f * (plus[1] - minus[1])
-        D[3, a] = f * (plus[2] - minus[2])
-        for k in range(min(n, trails.shape[1])):
-            for r in range(3):
-                trails[a, k, r] = f * (up[k, r] - down[k, r])
-    return n
-
-
-@njit(cache=True)
-def newton(rod, field, base, clamp, load, u, X, S, b, trails, D):  # type: ignore[no-untyped-def]
-    """Iterate u to an equilibrium; return False if the iteration does not contract.
-
-    The matrix D is kept while each correction is below a twentieth of the last.
-    """
-    nowhere = np.zeros((0, 3))
-    miss, d = np.zeros(3), np.zeros(3)
-    fresh = False
-    before = math.inf
-    for _ in range(40):
-        if field[0] != 0.0 and inside(field[1:], u[1], u[2], 0.0, 0.5 * rod[0, SIDE]):
-            return False
-        march(rod, field, base, clamp, load, u, ORDER, X, S, b, nowhere, miss)
-        if not fresh and before == math.inf:
-            columns(rod, field, base, clamp, load, u, X, S, b, trails, D)
-            fresh = True
-        if not solve3(D, miss[0], miss[1], miss[2], d):
-            return False
-        size = max(abs(d[0]), abs(d[1]), abs(d[2]))
-        if not size < 1.0:
-            return False
-        if size > 0.05 * before:
-            if fresh and size > 0.5 * before:
-                return False
-            columns(rod, field, base, clamp, load, u, X, S, b, trails, D)
-            fresh = True
-            solve3(D, miss[0], miss[1], miss[2], d)
-            size = max(abs(d[0]), abs(d[1]), abs(d[2]))
-        else:
-            fresh = False
-        for i in range(3):
-            u[i] += d[i]
-        if size < CONVERGED:
-            return True
-        before = size
-    return False
-
-
-@njit(cache=True)
-def stability(rod, field, base, clamp, load, u, X, S, b, trails, D):  # type: ignore[no-untyped-def]
-    """Count the zeros of the Jacobi determinant from tip to root: the Morse index."""
-    n = columns(rod, field, base, clamp, load, u, X, S, b, trails, D)
-    J = np.zeros((4, 3))
-    zeros = 0
-    positive = True
-    for k in range(n):
-        for a in range(3):
-            J[0, a] = trails[a, k, 0]
-            J[2, a] = trails[a, k, 1]
-            J[3, a] = trails[a, k, 2]
-        if k == n - 1:
-            J[:] = D
-        if (jacobi(J, 3) > 0.0) != positive:
-            positive = not positive
-            zeros += 1
-    return zeros
-
-
-@njit(cache=True)
-def solve_from(rod, field, base, clamp, u, trails, D):  # type: ignore[no-untyped-def]
-    """Find the equilibrium of full load, from u or by following the load from zero.
-
-    Returns
-    -------
-    tuple
-        Morse index (-1: none), load reached, error (dimensionless), root moment / -1.
-    """
-    X, S, b = np.zeros(8), np.zeros((SERIES, ORDER + 5)), np.zeros(12)
-    if not (
-        math.isfinite(u[0])
-        and newton(rod, field, base, clamp, 1.0, u, X, S, b, trails, D)
-        and stability(rod, field, base, clamp, 1.0, u, X, S, b, trails, D) == 0
-    ):
-        load = _follow(rod, field, base, clamp, u, X, S, b, trails, D)
-        if load < 1.0:
-            return -1, load, 0.0, 0.0
-    index = stability(rod, field, base, clamp, 1.0, u, X, S, b, trails, D)
-    miss, d = np.zeros(3), np.zeros(3)
-    nowhere = np.zeros((0, 3))
-    march(rod, field, base, clamp, 1.0, u, ORDER + 4, X, S, b, nowhere, miss)
-    solve3(D, miss[0], miss[1], miss[2], d)
-    error = abs(miss[0]) + abs(miss[1]) + abs(miss[2])
-    for i in range(3):
-        u[i] += d[i]
-        error += abs(d[i])
-    return index, 1.0, error, X[1]
-
-
-@njit(cache=True)
-def _follow(rod, field, base, clamp, u, X, S, b, trails, D):  # type: ignore[no-untyped-def]
-    """Follow the load from zero in u; return the load reached."""
-    u[0], u[1], u[2], u[3] = 0.0, math.cos(clamp), math.sin(clamp), clamp
-    here, last = u.copy(), u.copy()
-    load, jump, previous = 0.0, 0.125, 0.0
-    while load < 1.0:
-        jump = min(jump, 1.0 - load)
-        ahead = jump / previous if previous > 0.0 else 0.0
-        for i in range(3):
-            u[i] = here[i] + ahead * (here[i] - last[i])
-        size = max(abs(u[0] - here[0]), abs(u[1] - here[1]), abs(u[2] - here[2]))
-        if size < 0.3 and newton(
-            rod, field, base, clamp, load + jump, u, X, S, b, trails, D
-        ):
-            size = max(abs(u[0] - here[0]), abs(u[1] - here[1]), abs(u[2] - here[2]))
-            if size < 0.4:
-                last[:] = here
-                here[:] = u
-                load = 1.0 if jump == 1.0 - load else load + jump
-                previous = jump
-                jump *= 2.0
-                continue
-        jump *= 0.5
-        if jump < 1e-6:
-            u[:] = here
-            return load
-    return 1.0
-
-
-@njit(cache=True)
 def shape(rod, field, base, u, s, out):  # type: ignore[no-untyped-def]
     """Fill `out` (4, n): x, y, tangent angle, its derivative, at ascending stations s.
 
     Beyond the joint's own turn nothing is said of what happens within a side of it; at
-    the root the measured profile of the clamped face is added (`solid.end_zone`).
+    the root the measured profile of the clamped face is still to add (`end_zone`).
     """
     X, S, b = np.zeros(8), np.zeros((SERIES, ORDER + 5)), np.zeros(12)
     cf, sf = math.cos(u[3]), math.sin(u[3])
@@ -369,7 +215,7 @@ def shape(rod, field, base, u, s, out):  # type: ignore[no-untyped-def]
     for i in range(rod.shape[0]):
         X[6] = cf * rod[i, WX] + sf * rod[i, WY]
         X[7] = cf * rod[i, WY] - sf * rod[i, WX]
-        n = max(1, math.ceil(rod[i, H] * math.sqrt(rod[i, E] * base[2]) / STEP))
+        n = steps_of(rod, i, base)
         h = rod[i, H] / n
         for j in range(n):
             x0, y0 = X[2], X[3]
@@ -395,3 +241,22 @@ def shape(rod, field, base, u, s, out):  # type: ignore[no-untyped-def]
             reached += h
         if i + 1 < rod.shape[0]:
             _cross(rod, field, 1.0, i, u, X, b)
+
+
+@njit(cache=True)
+def end_zone(s, clamp, shift, width, out):  # type: ignore[no-untyped-def]
+    """Add the axis's own profile near the fixed face, which decays within a side.
+
+    From the same finite elements as the constants: the axis leaves the face at an
+    angle, since the face holds its points and not their slopes.
+    """
+    for k in range(s.shape[0]):
+        t = s[k] / width
+        if t > 40.0:
+            return
+        decay = -shift * math.exp(-t)
+        profile = decay * (1.0 + END_SLOPE * t)
+        out[0, k] -= math.sin(clamp) * profile
+        out[1, k] += math.cos(clamp) * profile
+        out[2, k] += decay * (END_SLOPE - 1.0 - END_SLOPE * t) / width
+        out[3, k] += decay * (1.0 - 2.0 * END_SLOPE + END_SLOPE * t) / width**2
