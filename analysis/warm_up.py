@@ -10,7 +10,6 @@ from __future__ import annotations
 import multiprocessing
 import sys
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 
@@ -21,12 +20,7 @@ def is_warm() -> bool:
     from ..sim.solid_solve import solve_shape
     from ..vision.edges import _sample
 
-    for kernel in (solve_rows, solve_shape, _sample):
-        cache = getattr(kernel.compiled, "_cache", None)
-        folder = Path(getattr(cache, "cache_path", ""))
-        if not any(folder.glob(f"*{kernel.__name__}-*.nbi")):
-            return False
-    return True
+    return all(kernel.is_stored for kernel in (solve_rows, solve_shape, _sample))
 
 
 def warm_up() -> None:

@@ -9,9 +9,11 @@ else calls kernels and gets machine code.
 from __future__ import annotations
 
 import functools
+import hashlib
 import threading
 from collections.abc import Callable
 from contextvars import ContextVar
+from types import CodeType
 from typing import Any, TypeVar
 
 Result = TypeVar("Result")
@@ -54,8 +56,34 @@ class Kernel:
                 if self._compiled is None:
                     from numba import njit as numba_njit
 
-                    self._compiled = numba_njit(**self._options)(self._function)
+                    compiled = numba_njit(**self._options)(self._function)
+                    if self._options.get("cache"):
+                        file = compiled._cache._cache_file
+                        file._source_stamp = (file._source_stamp, self.fingerprint)
+                    self._compiled = compiled
         return self._compiled
+
+    @functools.cached_property
+    def fingerprint(self) -> str:
+        """Digest of the function and of all kernels and constants that it uses.
+
+        Numba takes its stored machine code for fresh while the file of the function is
+        unchanged, although it holds the kernels of other files too.
+        """
+        digest = hashlib.sha256()
+        for code in _codes(self._function.__code__):
+            digest.update(code.co_code + repr(_plain(code.co_consts)).encode())
+            for name in code.co_names:
+                value = self._function.__globals__.get(name)
+                if isinstance(value, Kernel) and value is not self:
+                    value = value.fingerprint
+                digest.update(f"{name} {_plain((value,))}".encode())
+        return digest.hexdigest()
+
+    @property
+    def is_stored(self) -> bool:
+        """Whether machine code of this very kernel waits in numba's cache."""
+        return bool(self.compiled._cache._cache_file._load_index())
 
     @property
     def _numba_type_(self) -> Any:
@@ -79,6 +107,18 @@ class Kernel:
         except (ArithmeticError, ValueError):
             # 1 / 0 and sqrt(-1) are numbers to machine code.
             raise _Unfit from None
+
+
+def _codes(code: CodeType) -> list[CodeType]:
+    """Return a function's code and that of the functions within it."""
+    inner = [item for item in code.co_consts if isinstance(item, CodeType)]
+    return [code, *(nested for item in inner for nested in _codes(item))]
+
+
+def _plain(values: tuple[Any, ...]) -> list[Any]:
+    """Return those of some values that are numbers, texts or tuples of them."""
+    kinds = (bool, int, float, complex, str, bytes, tuple)
+    return [value for value in values if isinstance(value, kinds)]
 
 
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Kernel]:

@@ -7,6 +7,7 @@ import pickle
 import subprocess
 import sys
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -98,3 +99,41 @@ def test_a_kernel_keeps_its_name_and_goes_to_other_processes() -> None:
     assert newton.__name__ == "newton"
     assert "equilibrium" in str(newton.__doc__)
     assert pickle.loads(pickle.dumps(newton)) is newton
+
+
+INNER = """
+from magbend.core.jit import njit
+FACTOR = {factor}
+
+@njit(cache=True)
+def inner(x):
+    return FACTOR * x
+"""
+OUTER = """
+from inner import inner
+from magbend.core.jit import njit
+
+@njit(cache=True)
+def outer(x):
+    return inner(x) + 1.0
+
+stored = outer.is_stored
+print(stored, outer(1.0))
+"""
+
+
+def test_stored_code_is_not_used_once_a_kernel_it_holds_has_changed(
+    tmp_path: Path,
+) -> None:
+    def run(factor: float) -> str:
+        (tmp_path / "inner.py").write_text(INNER.format(factor=factor))
+        done = subprocess.run(
+            [sys.executable, "-B", tmp_path / "outer.py"],
+            check=True, capture_output=True, text=True,
+        )  # fmt: skip
+        return done.stdout.strip()
+
+    (tmp_path / "outer.py").write_text(OUTER)
+    assert run(2.0) == "False 3.0"
+    assert run(2.0) == "True 3.0"
+    assert run(5.0) == "False 6.0"
