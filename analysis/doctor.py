@@ -145,10 +145,20 @@ def _ports() -> list[Finding]:
     if not ports:
         detail = "none found; plug the board in, then: magbend rig ports"
         return [Finding(subject="serial ports", status="absent", detail=detail)]
-    return [
-        Finding(subject=f"port {port.device}", status="ok", detail=port.description)
-        for port in ports
-    ]
+    return [_port(port) for port in ports]
+
+
+def _port(port: Any) -> Finding:
+    """Judge a port by its permissions: opening it would restart many boards."""
+    subject = f"port {port.device}"
+    if Path(port.device).exists() and not os.access(port.device, os.R_OK | os.W_OK):
+        detail = (
+            "may not be opened by this user; on Linux add the user to the group "
+            "dialout and log in again"
+        )
+        return Finding(subject=subject, status="broken", detail=detail)
+    detail = port.description if port.vid else "no USB device known behind it"
+    return Finding(subject=subject, status="ok", detail=detail)
 
 
 def _cameras() -> list[Finding]:

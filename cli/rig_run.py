@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -184,7 +185,11 @@ def init(
 
 
 def _report(line: str) -> None:
-    typer.echo(line, err=True)
+    """Write a line above the progress bar; a leading bell is rung."""
+    if line.startswith("\a") and sys.__stderr__ is not None:
+        sys.__stderr__.write("\a")  # the bar's own stream would strip it
+        sys.__stderr__.flush()
+    sys.stderr.write(line.lstrip("\a") + "\n")
 
 
 def _run_folder(plan: Plan, out: Path | None, resume: bool) -> Path:
@@ -196,6 +201,11 @@ def _run_folder(plan: Plan, out: Path | None, resume: bool) -> Path:
             "--resume needs --out: name the folder of the run that is to go on"
         )
     folder = out or Path("runs") / _dated_name(plan)
+    if resume and not is_run(folder):
+        raise StoreError(
+            f"{folder}: holds no run that could go on (there is no run.json); name the "
+            f"folder of the run with --out, or leave --resume out to begin one"
+        )
     if is_run(folder) and not resume:
         raise StoreError(
             f"{folder}: holds a run already; add --resume to go on with it, or name "

@@ -14,7 +14,7 @@ name = "bench"
 
 [stage]
 driver = "grbl"            # grbl (also grblHAL, FluidNC) or marlin
-port = "auto"              # auto, /dev/ttyUSB0, COM3, or serial:NUMBER of the USB chip
+{port}# auto, /dev/ttyUSB0, COM3, or serial:NUMBER of the USB chip
 axis = "X"
 # The gap is the distance from the magnet's N face to the rod's undeformed tip:
 #     gap_mm = gap_at_zero_mm + direction * machine_mm
@@ -33,14 +33,15 @@ min_gap_mm = 40.0          # interlock: nothing nearer is ever sent to the stage
 max_gap_mm = 149.0
 
 [camera]
-backend = "{camera}"           # auto, opencv, mjpeg, folder, video, twin
+{camera}# auto, opencv, mjpeg, folder, video, twin
 source = 0                 # device number, http://... stream, folder or video file
 # exposure = 100.0         # locked, read back, and proved by the brightness
 # gain = 0.0
 frame_timeout_s = 5.0
 
 [meter]
-driver = "{meter}"         # {meters}; manual, none, twin
+{meter}# manual, none, twin, or one of
+#   {meters}
 # port = "/dev/ttyUSB1"
 # zero_mT = 0.0            # reading in zero field, taken off every reading
 
@@ -94,6 +95,11 @@ E_MPa = 10.0
 """
 
 
+def _row(key: str, value: str) -> str:
+    """Return a row of TOML, padded so that the comments stand below each other."""
+    return f'{key} = "{value}"'.ljust(27)
+
+
 def write_templates(folder: Path, *, twin: bool = False) -> tuple[Path, ...]:
     """Write ``rig.toml``, ``plan.toml`` and ``specimen.toml``; overwrite nothing.
 
@@ -112,8 +118,9 @@ def write_templates(folder: Path, *, twin: bool = False) -> tuple[Path, ...]:
     from .meter_description import ready_meters
 
     rig = RIG.format(
-        camera="twin" if twin else "auto",
-        meter="twin" if twin else "manual",
+        port=_row("port", "twin://board.json" if twin else "auto"),
+        camera=_row("backend", "twin" if twin else "auto"),
+        meter=_row("driver", "twin" if twin else "manual"),
         meters=", ".join(ready_meters()),
     )
     texts = {"rig.toml": rig, "plan.toml": PLAN, "specimen.toml": SPECIMEN}

@@ -47,6 +47,21 @@ def test_run_and_verify(bench_folder: Path) -> None:
     assert manifest["twin"] is True
 
 
+def test_resuming_what_is_not_there_begins_nothing(bench_folder: Path) -> None:
+    done = magbend(
+        "rig", "run", "plan.toml", "--out", "rnu", "--resume", cwd=bench_folder
+    )
+    assert done.returncode == 1
+    assert "rnu: holds no run that could go on" in done.stderr
+    assert not (bench_folder / "rnu").exists()
+
+
+def test_the_stage_of_the_first_files_answers(bench_folder: Path) -> None:
+    done = magbend("rig", "status", cwd=bench_folder)
+    assert done.returncode == 0, done.stderr
+    assert "home it" in done.stdout
+
+
 def test_verify_fails_on_an_altered_picture(bench_folder: Path, tmp_path: Path) -> None:
     import shutil
 
