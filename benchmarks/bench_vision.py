@@ -4,7 +4,9 @@
 
 One row a light and scale (nine shapes each): errors in pixels against the truth, the
 share of points within one standard deviation, and CPU time of one thread without
-decoding, the best of five. Ratios against a named peer: `bench_vision_peers.py`.
+decoding, the best of five. Then, for the 2-megapixel frames: the time of each stage,
+and that of the peers' skeleton of the same frames, whose mask is given to them. Errors
+of the peers: `bench_vision_peers.py`; frames per second: `bench_vision_batch.py`.
 """
 
 from __future__ import annotations
@@ -16,11 +18,18 @@ from importlib import import_module
 
 import cv2
 import numpy as np
+from bench_vision_peers import longest_path, rod_mask
+from skimage.morphology import skeletonize
 
 from magbend.vision import as_photo, extract, score
 from magbend.vision.synthetic import frames
 
-STAGES = ("binarise", "find_candidates", "start_curve", "refine", "measurement")
+STAGES = {
+    "binarise": "extract", "find_candidates": "extract", "start_curve": "extract",
+    "refine": "extract", "find_joints": "refine", "measurement": "extract",
+    "doubts": "extract",
+}  # fmt: skip
+"""What is timed, and the module that calls it; joints are sought within `refine`."""
 
 
 def best_ms(photo, calibration, repeats=5) -> float:
@@ -32,30 +41,50 @@ def best_ms(photo, calibration, repeats=5) -> float:
     return 1e3 * min(times)
 
 
-def stages_ms(photo, calibration, repeats=7) -> dict[str, float]:
-    """Best time of each stage, measured around the calls that `extract` makes."""
-    module = import_module("magbend.vision.extract")
-    kept = {name: getattr(module, name) for name in STAGES}
-    spent: dict[str, list[float]] = defaultdict(list)
+def stages_ms(pairs, repeats=5) -> dict[str, float]:
+    """Median over frames of the best time of each stage, around the very calls."""
+    modules = {n: import_module(f"magbend.vision.{m}") for n, m in STAGES.items()}
+    kept = {name: getattr(module, name) for name, module in modules.items()}
+    spent: dict[str, float] = defaultdict(float)
 
     def timed(name):
         def call(*args, **options):
             start = time.process_time()
-            result = kept[name](*args, **options)
-            spent[name].append(time.process_time() - start)
-            return result
+            try:
+                return kept[name](*args, **options)
+            finally:
+                spent[name] += time.process_time() - start
 
         return call
 
+    rows = []
     try:
-        for name in STAGES:
+        for name, module in modules.items():
             setattr(module, name, timed(name))
-        for _ in range(repeats):
-            extract(photo, calibration)
+        for photo, camera in pairs:
+            runs = []
+            for _ in range(repeats):
+                spent.clear()
+                extract(photo, camera)
+                runs.append([spent[name] for name in STAGES])
+            rows.append(np.min(runs, axis=0))
     finally:
-        for name in STAGES:
+        for name, module in modules.items():
             setattr(module, name, kept[name])
-    return {name: 1e3 * min(spent[name]) for name in STAGES}
+    return dict(zip(STAGES, 1e3 * np.median(rows, axis=0), strict=True))
+
+
+def cpu_ms(work, inputs) -> float:
+    """Median CPU time of one call, over inputs, the best of three each."""
+    times = []
+    for item in inputs:
+        runs = []
+        for _ in range(3):
+            start = time.process_time()
+            work(item)
+            runs.append(time.process_time() - start)
+        times.append(min(runs))
+    return 1e3 * float(np.median(times))
 
 
 def main() -> None:
@@ -65,7 +94,7 @@ def main() -> None:
     options = parser.parse_args()
     cv2.setNumThreads(1)
     rows = defaultdict(list)
-    failed, first = [], None
+    failed, chosen = [], []
     for index, frame in enumerate(frames(options.seed)):
         if index == options.frames:
             break
@@ -74,8 +103,8 @@ def main() -> None:
         if not result.ok:
             failed.append(f"{frame.name}: {result.reason}")
             continue
-        if first is None or frame.name == "graded090_standard_20":
-            first = (photo, camera)
+        if frame.name.endswith("standard_20"):
+            chosen.append(frame)
         rows[frame.name.split("_", 1)[1]].append(
             (score(result, frame.truth), best_ms(photo, camera), result.flags)
         )
@@ -96,10 +125,18 @@ def main() -> None:
             f"{np.median([item[1] for item in row]):6.1f}"
         )
     print(f"refused: {len(failed)}", *failed, sep="\n  ")
-    if first is not None:
-        print("stages of one 2-megapixel frame, ms:", {
-            name: round(value, 2) for name, value in stages_ms(*first).items()
-        })  # fmt: skip
+    if chosen:
+        height, width = chosen[0].image.shape
+        print(
+            f"{len(chosen)} frames of {width} x {height} px, standard light, 20 px/mm"
+        )
+        pairs = [(as_photo(one.image), one.truth.calibration) for one in chosen]
+        whole = cpu_ms(lambda pair: extract(*pair), pairs)
+        stages = ", ".join(f"{name} {ms:.2f}" for name, ms in stages_ms(pairs).items())
+        print(f"without decoding: median {whole:.1f} ms ({stages})")
+        masks = [rod_mask(one)[0] for one in chosen]
+        path = cpu_ms(lambda mask: longest_path(skeletonize(mask)), masks)
+        print(f"scikit-image skeletonize + skan, mask given: median {path:.1f} ms")
 
 
 if __name__ == "__main__":

@@ -7,11 +7,12 @@ import json
 import logging
 import math
 import multiprocessing
+import os
 import signal
-import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -20,9 +21,10 @@ import cv2
 import numpy as np
 
 from ..core.errors import MagbendError, VisionError
-from ..core.files import write_bytes, write_text
+from ..core.files import write_bytes
 from ..core.progress import Progress, silent
 from . import tables
+from .batch_state import Done, State
 from .calibration import Calibration
 from .extract import extract
 from .inputs import Source, digest, list_sources, read_source
@@ -32,8 +34,6 @@ from .photo import Photo, read_photo
 
 _log = logging.getLogger(__name__)
 
-STATE_FILE = "extract.json"
-_CHECKPOINT_S = 20.0
 _CHUNK = 8
 _DOUBTFUL_SCALE = 5e-4
 
@@ -99,17 +99,6 @@ class BatchResult:
     def measured(self) -> int:
         """How many photographs could be measured."""
         return sum(frame.ok for frame in self.frames)
-
-
-@dataclass(frozen=True, slots=True)
-class _Done:
-    """The text that one photograph adds to the tables."""
-
-    image: str
-    sha256: str
-    frame: str
-    centreline: str
-    edges: str
 
 
 def measure(photo: Photo, settings: Settings) -> Measurement:
@@ -205,7 +194,7 @@ def extract_files(
         edges.parent.mkdir(parents=True, exist_ok=True)
     if overlays:
         (out / "overlays").mkdir(exist_ok=True)
-    state = _State(out, edges, settings.fingerprint(), [s.image for s in sources])
+    state = State(out, edges, settings.fingerprint(), [s.image for s in sources])
     if resume:
         state.load(sources)
     todo = [source for source in sources if source.image not in state.done]
@@ -234,7 +223,7 @@ class _Task:
     overlays: Path | None
     edges: bool
 
-    def __call__(self, source: Source) -> _Done:
+    def __call__(self, source: Source) -> Done:
         sha256 = ""
         photo = None
         try:
@@ -245,7 +234,7 @@ class _Task:
             measurement = failure("unreadable", str(error))
         if self.overlays is not None and photo is not None:
             write_bytes(self.overlays / source.overlay, overlay_png(photo, measurement))
-        return _Done(
+        return Done(
             source.image,
             sha256,
             tables.frame_row(source.image, measurement),
@@ -259,6 +248,25 @@ class _Task:
 _task: _Task | None = None
 
 
+@contextmanager
+def _single_threaded_children() -> Iterator[None]:
+    """Let processes that start meanwhile keep to one core each.
+
+    The linear algebra libraries read these when they are loaded.
+    """
+    names = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS")
+    before = {name: os.environ.get(name) for name in names}
+    os.environ.update(dict.fromkeys(names, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
 def _start_worker(task: _Task) -> None:
     global _task
     _task = task
@@ -267,13 +275,13 @@ def _start_worker(task: _Task) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _work(source: Source) -> _Done:
+def _work(source: Source) -> Done:
     if _task is None:
         raise RuntimeError("the worker was not started")
     return _task(source)
 
 
-def _run(task: _Task, todo: list[Source], workers: int) -> Iterator[_Done]:
+def _run(task: _Task, todo: list[Source], workers: int) -> Iterator[Done]:
     """Yield results in the order of `todo`; finish alone if the workers die."""
     finished = 0
     if workers > 1 and len(todo) > 1:
@@ -285,7 +293,9 @@ def _run(task: _Task, todo: list[Source], workers: int) -> Iterator[_Done]:
         )
         try:
             chunk = max(1, min(_CHUNK, len(todo) // workers))
-            for done in pool.map(_work, todo, chunksize=chunk):
+            with _single_threaded_children():
+                results = pool.map(_work, todo, chunksize=chunk)
+            for done in results:
                 finished += 1
                 yield done
         except BrokenProcessPool:
@@ -294,93 +304,6 @@ def _run(task: _Task, todo: list[Source], workers: int) -> Iterator[_Done]:
             pool.shutdown(cancel_futures=True)
     for source in todo[finished:]:
         yield task(source)
-
-
-class _State:
-    """The tables so far; written whole from time to time, and at the end."""
-
-    def __init__(
-        self, out: Path, edges: Path | None, settings: str, order: list[str]
-    ) -> None:
-        self._out, self._edges, self._settings = out, edges, settings
-        self._order = order
-        self._next_write = time.monotonic() + _CHECKPOINT_S
-        self.done: dict[str, _Done] = {}
-
-    def add(self, done: _Done) -> None:
-        """Take a result; write a checkpoint if the last one is long ago."""
-        self.done[done.image] = done
-        now = time.monotonic()
-        if now > self._next_write:
-            self.write()
-            took = time.monotonic() - now
-            self._next_write = now + max(_CHECKPOINT_S, 20.0 * took)
-
-    def write(self) -> None:
-        """Write all tables; the state goes last and names only what they hold."""
-        ready = [self.done[image] for image in self._order if image in self.done]
-        write_text(
-            self._out / "centrelines.csv",
-            tables.header(tables.CENTRELINE_HEADER)
-            + "".join(done.centreline for done in ready),
-        )
-        write_text(
-            self._out / "frames.csv",
-            tables.header(tables.FRAME_HEADER) + "".join(done.frame for done in ready),
-        )
-        if self._edges is not None:
-            write_text(
-                self._edges,
-                tables.header(tables.EDGE_HEADER)
-                + "".join(done.edges for done in ready),
-            )
-        state = {
-            "schema": 1,
-            "settings_sha256": self._settings,
-            "edges": self._edges is not None,
-            "images": {done.image: done.sha256 for done in ready},
-        }
-        write_text(self._out / STATE_FILE, json.dumps(state, indent=1) + "\n")
-
-    def load(self, sources: list[Source]) -> None:
-        """Take over what an earlier call with the same settings has finished."""
-        try:
-            state = json.loads((self._out / STATE_FILE).read_text(encoding="utf-8"))
-            images = dict(state["images"])
-            if state["settings_sha256"] != self._settings:
-                return
-            if self._edges is not None and not state["edges"]:
-                return
-            frames = _lines_by_image(self._out / "frames.csv")
-            centrelines = _lines_by_image(self._out / "centrelines.csv")
-            edges = {} if self._edges is None else _lines_by_image(self._edges)
-        except (OSError, ValueError, KeyError, TypeError):
-            return
-        for source in sources:
-            name = source.image
-            if name in frames and source.path.exists():
-                sha256 = images.get(name)
-                if sha256 and sha256 == digest(source):
-                    self.done[name] = _Done(
-                        name, sha256, frames[name],
-                        centrelines.get(name, ""), edges.get(name, ""),
-                    )  # fmt: skip
-
-
-def _lines_by_image(path: Path) -> dict[str, str]:
-    """Return the lines of a table grouped by its first column."""
-    groups: dict[str, list[str]] = {}
-    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
-    for line in lines[1:]:
-        image = next(iter(_first_cell(line)), "")
-        groups.setdefault(image, []).append(line)
-    return {image: "".join(held) for image, held in groups.items()}
-
-
-def _first_cell(line: str) -> list[str]:
-    import csv
-
-    return next(csv.reader([line]), [])[:1]
 
 
 def _flattened(photo: Photo, bare: Photo) -> np.ndarray:

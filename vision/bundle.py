@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 Array = NDArray[np.float64]
 
@@ -226,6 +225,8 @@ def _solve(
     def jacobian(unknowns: Array) -> Array:
         _, rows = _project(unknowns, views, radius)
         return np.concatenate([rows / sigma, _prior_rows(unknowns, prior)[1]])
+
+    from scipy.optimize import least_squares  # half a second, not needed to measure
 
     fit = least_squares(
         residuals, start, jacobian, method="lm", x_scale="jac",

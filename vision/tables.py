@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from ..core.centreline import Centreline
 from ..core.errors import ConfigError
-from ..core.toml import read_text
 from .calibration import Calibration
 from .measurement import POINT_COLUMNS, Measurement, Pose
 
@@ -183,6 +182,8 @@ def to_centreline(columns: Mapping[str, Array]) -> Centreline:
 
 
 def _rows(path: Path, needed: Iterable[str]) -> list[dict[str, str]]:
+    from ..core.toml import read_text  # loads pydantic, not needed to write
+
     reader = csv.DictReader(io.StringIO(read_text(path)))
     missing = [name for name in needed if name not in (reader.fieldnames or ())]
     if missing:
