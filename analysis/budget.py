@@ -18,7 +18,7 @@ from ..core.errors import MagbendError
 from ..core.specimen import Specimen
 from .compare import Comparison, RunComparison, usable_flux
 from .fit import FitResult
-from .fit_problem import Nuisance
+from .nuisance import FRAME_ANGLE_SD_DEG
 
 ASSUMED = {
     "side_percent": 1.0,
@@ -248,6 +248,9 @@ def _measurement(last: Comparison) -> list[BudgetLine]:
         return []
     tip_mm = math.hypot(*frame.centreline.tip_mm)
     scale = ASSUMED["scale_percent"]
+    frame_deg, source = frame.clamp_angle_sd_deg, "stated by the photograph"
+    if not math.isfinite(frame_deg):
+        frame_deg, source = FRAME_ANGLE_SD_DEG, "assumed"
     lines = [
         BudgetLine(
             cause="scale of the camera",
@@ -257,8 +260,8 @@ def _measurement(last: Comparison) -> list[BudgetLine]:
         ),
         BudgetLine(
             cause="frame at the clamp",
-            tip_um=1e3 * math.radians(Nuisance().frame_angle_deg) * tip_mm,
-            taken=f"{Nuisance().frame_angle_deg:g} deg, twin bench",
+            tip_um=1e3 * math.radians(frame_deg) * tip_mm,
+            taken=f"{frame_deg:.2g} deg, {source}",
             kind="measurement",
         ),
     ]

@@ -212,8 +212,17 @@ def compare_run(
     )
 
 
-def fit_run_magnet(run: RunData) -> tuple[sim.MagnetFit | None, Magnet | None]:
+def fit_run_magnet(
+    run: RunData, *, farther_mm: float = 0.0
+) -> tuple[sim.MagnetFit | None, Magnet | None]:
     """Fit one remanence to the readings of a run.
+
+    Parameters
+    ----------
+    run : RunData
+        With its readings.
+    farther_mm : float
+        How much farther than stated the magnet stands.
 
     Returns
     -------
@@ -227,7 +236,7 @@ def fit_run_magnet(run: RunData) -> tuple[sim.MagnetFit | None, Magnet | None]:
         return None, run.magnet
     sd = [s.flux_sd_mT for s in steps]
     fit = sim.fit_magnet(
-        [s.gap_mm for s in steps],
+        [s.gap_mm + farther_mm for s in steps],
         [s.flux_mT for s in steps],
         sides_mm=run.magnet.sides_mm,
         sd_mT=sd if all(math.isfinite(value) and value > 0.0 for value in sd) else None,

@@ -28,8 +28,10 @@ from .. import sim
 from ..core.errors import InputError, MagbendError, SolverError
 from ..core.files import write_text
 from ..core.specimen import Specimen
-from .fit_problem import WALL, Nuisance, Problem, build_problem, residuals
+from .fit_problem import Problem, build_problem, with_shared
+from .fit_residuals import WALL, misfit, residuals, shared_length_mm
 from .load import RunData
+from .nuisance import Nuisance
 
 if TYPE_CHECKING:
     from .posterior import Posterior
@@ -123,6 +125,7 @@ class FitResult:
             "condition_number": self.condition_number,
             "not_identifiable": list(self.not_identifiable),
             "chi2_reduced": self.chi2_reduced,
+            "shared_error_mm": self.problem.shared_mm,
             "parameters": list(self.parameters),
             "values": list(self.values),
             "sd": list(self.sd),
@@ -149,13 +152,13 @@ def fit_runs(
     bounds_MPa: tuple[float, float] | None = None,
     falling: bool = False,
     prior_MPa: tuple[float, float] | None = None,
-    independent_every_mm: float = 2.0,
+    shared_mm: float | None = None,
 ) -> FitResult:
     """Fit one set of moduli to all steps of one or several runs.
 
     Parameters
     ----------
-    runs, model, free, nuisance, support, independent_every_mm
+    runs, model, free, nuisance, support
         See `build_problem`.
     bounds_MPa : tuple of float, optional
         Hard bounds of the moduli.
@@ -164,6 +167,9 @@ def fit_runs(
     prior_MPa : tuple of float, optional
         A Gaussian prior of the logarithm of each modulus, centred in this range with
         the range as its 95 % interval: `PRIOR_RANGE_MPA` is the paper's.
+    shared_mm : float, optional
+        Over which neighbouring points of a measured line share their error; as the
+        residuals show it if not given.
 
     Raises
     ------
@@ -178,10 +184,14 @@ def fit_runs(
         free=free,
         nuisance=nuisance,
         support=support,
-        independent_every_mm=independent_every_mm,
     )
     prior = _prior(problem, prior_MPa)
     unknowns = _search(problem, prior, bounds_MPa, falling)
+    # What the first search leaves over shows how far the errors of a line reach.
+    if shared_mm is None:
+        shared_mm = shared_length_mm(problem, misfit(problem, unknowns))
+    problem = with_shared(problem, shared_mm)
+    unknowns = _search(problem, prior, bounds_MPa, falling, unknowns)
     return _result(problem, prior, unknowns, model)
 
 
@@ -214,6 +224,7 @@ def _search(
     prior: Array,
     bounds_MPa: tuple[float, float] | None,
     falling: bool,
+    begin: Array | None = None,
 ) -> Array:
     """Find the least sum of squares; moduli that must fall are fitted by their steps.
 
@@ -247,7 +258,9 @@ def _search(
             np.vstack([slopes, rows]) @ turn,
         )
 
-    start = np.clip(np.linalg.solve(turn, -offset), lower + 1e-3, upper - 1e-3)
+    begin = np.zeros(problem.size) if begin is None else begin
+    start = np.linalg.solve(turn, begin - offset)
+    start = np.clip(start, lower + 1e-3, upper - 1e-3)
     cache: dict[bytes, tuple[Array, Array]] = {}
     # What is refused at the start is wrong with the input and is told; later on it is
     # the search that went where nothing can be solved.
@@ -312,8 +325,8 @@ def _result(problem: Problem, prior: Array, unknowns: Array, model: str) -> FitR
     bad = spread > DEGENERATE_SD
     names, directions = _degenerate(problem, vectors[:, bad])
     fitted = float(np.trace(np.linalg.pinv(with_prior) @ information))
-    effective = len(data) / problem.correlation_points
-    chi2 = float(data @ data) / max(effective - fitted, 1.0)
+    spare = max(problem.independent_points - fitted, 1.0)
+    chi2 = float(data @ data) / spare
     covariance = (vectors * np.square(spread)) @ vectors.T * max(1.0, chi2)
     root = np.sqrt(np.diag(covariance))
     nominal = np.array([problem.nominal(name) for name in problem.names])
@@ -432,10 +445,9 @@ def _residual_rows(
     rows = []
     start = 0
     for shot in problem.shots:
-        stop = start + len(shot.sd_mm)
-        rows.append(
-            (shot.label, shot.line.s_mm, data[start:stop] * shot.sd_mm, shot.sd_mm)
-        )
+        stop = start + len(shot.sigma_mm)
+        left_mm = data[start:stop] * shot.sd_mm
+        rows.append((shot.label, shot.line.s_mm, left_mm, shot.sigma_mm))
         start = stop
     return tuple(rows)
 

@@ -1,6 +1,5 @@
-"""What a fit minimises: residuals and their exact derivatives over steps and runs.
+"""What is fitted: the measured lines of steps and runs, the unknowns and their priors.
 
-Residuals are distances across the measured line, in units of their standard deviation.
 Unknowns are dimensionless: moduli, remanences and the load factor by their logarithm
 (relative to the nominal value), nuisance parameters in units of their prior standard
 deviation, so that a prior is one more residual of weight one.
@@ -9,7 +8,7 @@ deviation, so that a prior is one more residual of weight one.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,53 +21,20 @@ from ..core.magnet import Magnet
 from ..core.specimen import Specimen
 from .compare import field_of, fit_run_magnet, frame_problem
 from .load import RunData, Step
-from .metrics import position_at
+from .nuisance import Nuisance
 
 Array = NDArray[np.float64]
 
-SIGMA_FLOOR_MM = {"magnet": 0.002, "uniform": 0.1}
-"""Least standard deviation of a measured point, by field model. Before the magnet's
-field the camera's pixels, the paper and the lens decide, which no centreline knows of;
-a uniform field is itself wrong by tenths of a millimetre."""
-
-WALL = 1e3
-"""Residual of every point where the rod has no equilibrium."""
+MODEL_SD_MM = {"magnet": 1e-4, "uniform": 0.1}
+"""What a shape is off by in the field model alone, besides the measured line's own
+standard deviation. A uniform field is wrong by tenths of a millimetre."""
 
 UNKNOWN_SIGMA_MM = 0.05
 """Standard deviation taken where the centreline has none."""
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Nuisance:
-    """A parameter nobody asks for, known to `sd` (0: held) around its nominal value.
-
-    Attributes
-    ----------
-    sd : float
-        Standard deviation of the prior, in the unit of the name it is filed under.
-    """
-
-    clamp_angle_deg: float = 1.0
-    clamp_position_mm: float = 0.05
-    frame_angle_deg: float = 0.3
-    scale_percent: float = 0.2
-    magnet_percent: float = 0.5
-    weight_percent: float = 0.0
-
-    def __post_init__(self) -> None:
-        for name in NUISANCE_NAMES:
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise InputError(
-                    f"prior of {name} must be zero (held) or above; "
-                    f"instead received {value!r}"
-                )
-
-
-NUISANCE_NAMES = (
-    "clamp_angle_deg", "clamp_position_mm", "frame_angle_deg", "scale_percent",
-    "magnet_percent", "weight_percent",
-)  # fmt: skip
+START_SHARED_MM = 8.0
+"""Over which a line's points share their error, to start with: long, so that the priors
+hold the nuisances and what they cannot explain stays in the residuals to be seen."""
 
 FREE_NAMES = ("remanence_mT", "load_factor", "magnet_remanence_T")
 """What may be fitted besides the moduli, without a prior."""
@@ -84,9 +50,15 @@ class Shot:
         Index of the run and of the shot in the problem.
     normals : ndarray, shape (n, 2)
         Unit normals of the measured line, to its left.
+    sigma_mm : ndarray, shape (n,)
+        Standard deviation of each point across the line.
     sd_mm : ndarray, shape (n,)
-        Standard deviation of each point, correlation included: with it the points
-        count as independent.
+        The same, widened so that the points count as independent.
+    frame_sd_deg : float
+        How sure the photograph is of its clamp direction; NaN if it does not say.
+    remanence_per_mm : float
+        Relative change of the magnet's remanence that keeps the run's readings if the
+        magnet stands one mm farther.
     """
 
     run: int
@@ -96,7 +68,15 @@ class Shot:
     field: sim.UniformField | sim.MagnetField
     line: Centreline
     normals: Array
+    sigma_mm: Array
     sd_mm: Array
+    frame_sd_deg: float
+    remanence_per_mm: float
+
+    @property
+    def spacing_mm(self) -> float:
+        """Distance of neighbouring points."""
+        return self.line.length_mm / (len(self.line.s_mm) - 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,6 +91,8 @@ class Problem:
         Unknowns with a prior: a name of `NUISANCE_NAMES`, and the run or shot it is of.
     nuisance_sd : ndarray, shape (q,)
         Standard deviations of their priors, in their own units.
+    shared_mm : float
+        Over which neighbouring points of a line share their error.
     """
 
     specimen: Specimen
@@ -119,13 +101,21 @@ class Problem:
     names: tuple[str, ...]
     nuisances: tuple[tuple[str, int], ...]
     nuisance_sd: Array
-    correlation_points: float
+    shared_mm: float
     skipped: tuple[str, ...]
 
     @property
     def size(self) -> int:
         """Number of unknowns."""
         return len(self.names) + len(self.nuisances)
+
+    @property
+    def independent_points(self) -> float:
+        """How many points count, those that share their error once."""
+        return sum(
+            len(shot.sd_mm) * float(np.mean((shot.sigma_mm / shot.sd_mm) ** 2))
+            for shot in self.shots
+        )
 
     def nominal(self, name: str) -> float:
         """Return the nominal value of an unknown that is asked for."""
@@ -146,7 +136,7 @@ def build_problem(
     free: Sequence[str] = (),
     nuisance: Nuisance | None = None,
     support: sim.Support | None = None,
-    independent_every_mm: float = 2.0,
+    shared_mm: float = START_SHARED_MM,
 ) -> Problem:
     """Collect the shots of one or several runs of the same material.
 
@@ -163,9 +153,8 @@ def build_problem(
         Priors of the nuisance parameters.
     support : Support, optional
         Nominal clamp angle, weight and load factor.
-    independent_every_mm : float
-        Length over which neighbouring points of a measured line share their error (the
-        spline and the edge profiles smooth over about this much).
+    shared_mm : float
+        Over which neighbouring points of a measured line share their error.
 
     Raises
     ------
@@ -184,30 +173,42 @@ def build_problem(
         fit, magnet = fit_run_magnet(run)
         relative = fit.remanence_sd_T / fit.remanence_T if fit else 0.0
         magnet_sd.append(math.hypot(100.0 * relative, nuisance.magnet_percent))
+        slope = _remanence_per_mm(run)
         for step in run.steps:
-            shot = _shot(run, step, index, len(shots), model, magnet)
+            shot = _shot(run, step, (index, len(shots)), model, magnet, slope)
             if isinstance(shot, str):
                 skipped.append(f"{run.label}, step {step.index}: {shot}")
             else:
-                shots.append(_weighted(shot, independent_every_mm))
+                shots.append(shot)
     if not shots:
         raise StoreError(f"no step can be fitted; the first: {skipped[0]}")
     if "magnet_remanence_T" in free:
         nuisance = replace(nuisance, magnet_percent=0.0)
     nuisances, sds = _nuisances(runs, shots, nuisance, magnet_sd)
     sections = range(len(runs[0].specimen.sections))
-    points = sum(len(shot.line.s_mm) for shot in shots)
-    length_mm = sum(shot.line.length_mm for shot in shots)
-    return Problem(
+    problem = Problem(
         specimen=runs[0].specimen,
         shots=tuple(shots),
         support=support,
         names=(*(f"E_MPa[{i}]" for i in sections), *free),
         nuisances=tuple(nuisances),
         nuisance_sd=np.array(sds),
-        correlation_points=max(1.0, independent_every_mm * points / length_mm),
+        shared_mm=shared_mm,
         skipped=tuple(skipped),
     )
+    return with_shared(problem, shared_mm)
+
+
+def with_shared(problem: Problem, shared_mm: float) -> Problem:
+    """Return the problem with lines whose points within `shared_mm` count once."""
+    shots = tuple(
+        replace(
+            shot,
+            sd_mm=shot.sigma_mm * math.sqrt(max(1.0, shared_mm / shot.spacing_mm)),
+        )
+        for shot in problem.shots
+    )
+    return replace(problem, shots=shots, shared_mm=shared_mm)
 
 
 def _check(
@@ -242,9 +243,17 @@ def _check(
             )
 
 
+def _remanence_per_mm(run: RunData) -> float:
+    """Return how much stronger, per mm, the magnet is if it stands farther away."""
+    near, far = (fit_run_magnet(run, farther_mm=shift)[0] for shift in (-0.1, 0.1))
+    if near is None or far is None:
+        return 0.0
+    return math.log(far.remanence_T / near.remanence_T) / 0.2
+
+
 def _shot(
-    run: RunData, step: Step, run_index: int, index: int, model: str,
-    magnet: Magnet | None,
+    run: RunData, step: Step, indices: tuple[int, int], model: str,
+    magnet: Magnet | None, remanence_per_mm: float,
 ) -> Shot | str:  # fmt: skip
     frame = run.frame(step)
     problem = frame_problem(frame, run.specimen)
@@ -255,11 +264,12 @@ def _shot(
         return "no centreline"
     line = frame.centreline
     inside = line.s_mm <= run.specimen.length_mm * (1.0 + 1e-9)
-    sigma = np.where(np.isfinite(frame.sigma_mm), frame.sigma_mm, UNKNOWN_SIGMA_MM)
+    stated = np.where(np.isfinite(frame.sigma_mm), frame.sigma_mm, UNKNOWN_SIGMA_MM)
+    sigma = np.hypot(stated[inside], MODEL_SD_MM[model])
     theta = line.theta_rad[inside]
     return Shot(
-        run=run_index,
-        step=index,
+        run=indices[0],
+        step=indices[1],
         label=f"{run.label}, step {step.index}",
         specimen=run.specimen,
         field=field,
@@ -270,14 +280,11 @@ def _shot(
             }
         ),
         normals=np.column_stack([-np.sin(theta), np.cos(theta)]),
-        sd_mm=np.hypot(sigma[inside], SIGMA_FLOOR_MM[model]),
+        sigma_mm=sigma,
+        sd_mm=sigma,
+        frame_sd_deg=frame.clamp_angle_sd_deg,
+        remanence_per_mm=remanence_per_mm,
     )
-
-
-def _weighted(shot: Shot, every_mm: float) -> Shot:
-    """Widen the standard deviations so that correlated points count once."""
-    spacing_mm = shot.line.length_mm / (len(shot.line.s_mm) - 1)
-    return replace(shot, sd_mm=shot.sd_mm * math.sqrt(max(1.0, every_mm / spacing_mm)))
 
 
 def _nuisances(
@@ -294,208 +301,16 @@ def _nuisances(
             nuisances.append((name, index))
             sds.append(sd)
 
+    magnets = {s.run for s in shots if isinstance(s.field, sim.MagnetField)}
     for index in range(len(runs)):
         add("clamp_angle_deg", index, nuisance.clamp_angle_deg)
         add("scale_percent", index, nuisance.scale_percent)
         add("weight_percent", index, nuisance.weight_percent)
         if nuisance.magnet_percent:
             add("magnet_percent", index, magnet_sd[index])
+        if index in magnets:
+            add("gap_mm", index, nuisance.gap_mm)
     for shot in shots:
         add("clamp_position_mm", shot.step, nuisance.clamp_position_mm)
-        add("frame_angle_deg", shot.step, nuisance.frame_angle_deg)
+        add("frame_angle_deg", shot.step, nuisance.frame_sd_deg(shot.frame_sd_deg))
     return nuisances, sds
-
-
-def residuals(problem: Problem, unknowns: Array) -> tuple[Array, Array]:
-    """Return residuals of the data and their derivatives.
-
-    Parameters
-    ----------
-    unknowns : ndarray, shape (p + q,)
-        Logarithms of value over nominal value for `names`, then nuisances in units of
-        their prior standard deviation.
-
-    Returns
-    -------
-    residual : ndarray, shape (n,)
-        Measured minus predicted, across the line, over its standard deviation.
-    jacobian : ndarray, shape (n, p + q)
-        Derivatives of the residuals.
-    """
-    parts = [_shot_residuals(problem, shot, unknowns) for shot in problem.shots]
-    return (
-        np.concatenate([residual for residual, _ in parts]),
-        np.concatenate([jacobian for _, jacobian in parts]),
-    )
-
-
-def misfit(problem: Problem, unknowns: Array) -> Array:
-    """Return the residuals alone, as `residuals` does, at a fifth of its cost."""
-    parts = []
-    for shot in problem.shots:
-        values = _values(problem, shot, unknowns)
-        xy_mm = _shape(shot, *_model(problem, shot, values))
-        parts.append(
-            np.full(len(shot.sd_mm), WALL)
-            if xy_mm is None
-            else _seen(shot, values, xy_mm)[0]
-        )
-    return np.concatenate(parts)
-
-
-def _shape(
-    shot: Shot,
-    specimen: Specimen,
-    field: sim.UniformField | sim.MagnetField,
-    support: sim.Support,
-) -> Array | None:
-    """Return the predicted points, shape (n, 2), None where there is no equilibrium."""
-    shape = sim.solve(specimen, field, support=support, points=241).centreline
-    if shape is None:
-        return None
-    return np.column_stack(position_at(shape, _stations(shot)))
-
-
-def _stations(shot: Shot) -> Array:
-    # A measured line may be a little longer than the rod, never asked beyond its tip.
-    return np.minimum(shot.line.s_mm, shot.specimen.length_mm)
-
-
-def _shot_residuals(
-    problem: Problem, shot: Shot, unknowns: Array
-) -> tuple[Array, Array]:
-    values = _values(problem, shot, unknowns)
-    specimen, field, support = _model(problem, shot, values)
-    xy_mm = _shape(shot, specimen, field, support)
-    if xy_mm is None:
-        # No equilibrium at these values: a wall that sends the search back.
-        count = len(shot.sd_mm)
-        return np.full(count, WALL), np.zeros((count, problem.size))
-    names = [*(f"E_MPa[{i}]" for i in range(len(specimen.sections)))]
-    names += ["clamp_angle_deg", "load_factor"]
-    if any(support.gravity_m_s2):
-        names += ["gravity_m_s2[0]", "gravity_m_s2[1]"]
-    result = sim.sensitivities(
-        specimen, field, parameters=names, support=support, s_mm=_stations(shot)
-    )
-    slopes = {
-        name: np.column_stack([result.dx_mm[:, k], result.dy_mm[:, k]])
-        for k, name in enumerate(names)
-    }
-    residual, seen = _seen(shot, values, xy_mm)
-    return residual, _derivatives(problem, shot, values, seen, slopes)
-
-
-def _values(problem: Problem, shot: Shot, unknowns: Array) -> dict[str, float]:
-    """Return what the unknowns mean for one shot, by name, in their own units."""
-    values = {
-        name: problem.nominal(name) * math.exp(unknowns[k])
-        for k, name in enumerate(problem.names)
-    }
-    scaled = unknowns[len(problem.names) :] * problem.nuisance_sd
-    for (name, index), value in zip(problem.nuisances, scaled, strict=True):
-        if index == (shot.step if name in PER_SHOT else shot.run):
-            values[name] = float(value)
-    return values
-
-
-PER_SHOT = ("clamp_position_mm", "frame_angle_deg")
-
-
-def _model(
-    problem: Problem, shot: Shot, values: dict[str, float]
-) -> tuple[Specimen, sim.UniformField | sim.MagnetField, sim.Support]:
-    sections = tuple(
-        replace(section, E_MPa=values[f"E_MPa[{i}]"])
-        for i, section in enumerate(shot.specimen.sections)
-    )
-    specimen = replace(shot.specimen, sections=sections)
-    base = problem.support
-    weight = 1.0 + values.get("weight_percent", 0.0) / 100.0
-    # Remanences of rod and magnet enter, like the load factor, as factors on the load.
-    load = values.get("load_factor", base.load_factor)
-    load *= 1.0 + values.get("magnet_percent", 0.0) / 100.0
-    for name in ("remanence_mT", "magnet_remanence_T"):
-        if name in values:
-            load *= values[name] / problem.nominal(name)
-    gx, gy, gz = base.gravity_m_s2
-    support = replace(
-        base,
-        clamp_angle_deg=base.clamp_angle_deg + values.get("clamp_angle_deg", 0.0),
-        load_factor=load,
-        gravity_m_s2=(weight * gx, weight * gy, weight * gz),
-    )
-    return specimen, shot.field, support
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _View:
-    """How the predicted points of one shot are seen: rotation, scale, turned points."""
-
-    rotation: Array
-    scale: float
-    turned: Array
-
-
-def _seen(shot: Shot, values: dict[str, float], xy_mm: Array) -> tuple[Array, _View]:
-    """Turn the prediction into the measured frame; return the residuals across it.
-
-    The measured frame leaves the clamp along the rod: it is turned back by the clamp's
-    angle, then by the error of the frame, shifted across, and scaled.
-    """
-    turn = math.radians(
-        values.get("frame_angle_deg", 0.0) - values.get("clamp_angle_deg", 0.0)
-    )
-    scale = 1.0 + values.get("scale_percent", 0.0) / 100.0
-    c, s = math.cos(turn), math.sin(turn)
-    rotation = np.array([[c, -s], [s, c]])
-    turned = xy_mm @ rotation.T
-    shift = np.array([0.0, values.get("clamp_position_mm", 0.0)])
-    measured = np.column_stack([shot.line.x_mm, shot.line.y_mm])
-    residual = _across(shot, measured - scale * turned - shift)
-    return residual, _View(rotation=rotation, scale=scale, turned=turned)
-
-
-def _across(shot: Shot, vectors: Array) -> Array:
-    """Return the parts of vectors across the line, in standard deviations."""
-    return np.asarray(np.sum(vectors * shot.normals, axis=1) / shot.sd_mm)
-
-
-def _derivatives(
-    problem: Problem,
-    shot: Shot,
-    values: dict[str, float],
-    view: _View,
-    slopes: dict[str, Array],
-) -> Array:
-    """Return the derivatives of the residuals, shape (n, p + q)."""
-    seen = {
-        name: view.scale * slope @ view.rotation.T for name, slope in slopes.items()
-    }
-    load = seen["load_factor"] * _model(problem, shot, values)[2].load_factor
-    around = view.scale * np.column_stack([-view.turned[:, 1], view.turned[:, 0]])
-    degree = math.pi / 180.0
-    gravity = problem.support.gravity_m_s2
-    columns: dict[str, Callable[[], Array]] = {
-        "clamp_angle_deg": lambda: seen["clamp_angle_deg"] - degree * around,
-        "frame_angle_deg": lambda: degree * around,
-        "scale_percent": lambda: view.turned / 100.0,
-        "clamp_position_mm": lambda: np.tile([0.0, 1.0], (len(shot.sd_mm), 1)),
-        "magnet_percent": lambda: load / (100.0 + values["magnet_percent"]),
-        "weight_percent": lambda: (
-            (
-                seen["gravity_m_s2[0]"] * gravity[0]
-                + seen["gravity_m_s2[1]"] * gravity[1]
-            )
-            / 100.0
-        ),
-    }
-    jacobian = np.zeros((len(shot.sd_mm), problem.size))
-    for k, name in enumerate(problem.names):
-        slope = seen[name] * values[name] if name.startswith("E_MPa") else load
-        jacobian[:, k] = -_across(shot, slope)
-    for k, (name, index) in enumerate(problem.nuisances):
-        if index == (shot.step if name in PER_SHOT else shot.run):
-            column = _across(shot, columns[name]()) * problem.nuisance_sd[k]
-            jacobian[:, len(problem.names) + k] = -column
-    return jacobian

@@ -67,6 +67,9 @@ class Frame:
         Standard deviation across the line at its points, NaN where unknown.
     width_mm : float
         Median width.
+    clamp_angle_sd_deg : float
+        Standard deviation of the direction at the clamp, which turns the whole line;
+        NaN where the table does not say.
     pose : Pose or None
         Where the specimen frame lies in the board frame.
     """
@@ -79,6 +82,7 @@ class Frame:
     centreline: Centreline | None
     sigma_mm: NDArray[np.float64]
     width_mm: float
+    clamp_angle_sd_deg: float
     pose: Pose | None
 
 
@@ -407,6 +411,7 @@ def _frame(path: Path, row: Mapping[Any, Any], table: pd.DataFrame | None) -> Fr
         centreline=centreline,
         sigma_mm=_good(points, sigma) if sigma is not None else np.full(kept, np.nan),
         width_mm=_number(row.get("width_mm")),
+        clamp_angle_sd_deg=_number(row.get("clamp_angle_sd_deg")),
         pose=_pose(row),
     )
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..core.errors import InputError, MagbendError, MissingExtraError
 from ..core.progress import Progress, silent
 from .fit import PRIOR_RANGE_MPA, FitResult
-from .fit_problem import misfit, residuals
+from .fit_residuals import misfit, residuals
 
 Array = NDArray[np.float64]
 

@@ -88,7 +88,7 @@ def fit(
         [],
         "--hold",
         help="Hold a nuisance: clamp_angle_deg, clamp_position_mm, frame_angle_deg, "
-        "scale_percent, magnet_percent, weight_percent, or all; repeatable.",
+        "scale_percent, magnet_percent, gap_mm, weight_percent, or all; repeatable.",
     ),
     prior: list[str] = typer.Option(
         [], "--prior", help="Prior sd of a nuisance: NAME=SD; repeatable."
@@ -351,7 +351,7 @@ def _nuisance(hold: Sequence[str], prior: Sequence[str]) -> Any:
     """Return the priors with the named ones held or changed."""
     from dataclasses import replace
 
-    from ..analysis.fit_problem import NUISANCE_NAMES, Nuisance
+    from ..analysis.nuisance import NUISANCE_NAMES, Nuisance
 
     values = dict.fromkeys(NUISANCE_NAMES if "all" in hold else hold, 0.0)
     for text in prior:

@@ -43,11 +43,14 @@ def write_run(
     points: int = 61,
     image: bytes | None = None,
     end: bool = True,
+    reach_mm: float = 1.0,
+    clamp_angle_sd_deg: float = math.nan,
 ) -> Path:
     """Write a run folder whose true rod is `truth`, and return it.
 
     `frame_error` is the standard deviation of clamp position (mm), of the frame's
-    angle (deg) and of the scale (relative).
+    angle (deg) and of the scale (relative). Errors of neighbours are alike over
+    `reach_mm`.
     """
     specimen = specimen or sim.gmc(2)
     truth = truth or specimen
@@ -76,8 +79,12 @@ def write_run(
         field = sim.MagnetField(magnet=magnet, gap_mm=gap_mm)
         line = sim.solve(truth, field, support=support, points=points).centreline
         assert line is not None
-        xy, theta = _seen(line, clamp_angle_deg, scale, frame_error, sigma_mm, rng)
+        xy, theta = _seen(
+            line, clamp_angle_deg, scale, frame_error, sigma_mm, rng, reach_mm
+        )
         frames.append(_frame(name, truth, line.length_mm * scale, xy, theta))
+        if math.isfinite(clamp_angle_sd_deg):
+            frames[-1]["clamp_angle_sd_deg"] = clamp_angle_sd_deg
         good = np.ones(points)
         rows.append(
             (
@@ -101,7 +108,7 @@ def write_run(
     return path
 
 
-def _seen(line, clamp_angle_deg, scale, frame_error, sigma_mm, rng):
+def _seen(line, clamp_angle_deg, scale, frame_error, sigma_mm, rng, reach_mm):
     """Turn the shape into the frame of its own root, with errors of the frame."""
     angle = -math.radians(clamp_angle_deg)
     angle += math.radians(frame_error[1]) * rng.standard_normal()
@@ -109,10 +116,9 @@ def _seen(line, clamp_angle_deg, scale, frame_error, sigma_mm, rng):
     xy = scale * line.points_mm @ np.array([[c, s], [-s, c]])
     xy[:, 1] += frame_error[0] * rng.standard_normal()
     theta = line.theta_rad + angle
-    # Errors of neighbours on a measured line are alike over about 2 mm.
     gap = np.abs(line.s_mm[:, None] - line.s_mm[None, :])
     factor = np.linalg.cholesky(
-        np.exp(-0.5 * (gap / 1.0) ** 2) + 1e-9 * np.eye(len(gap))
+        np.exp(-0.5 * (gap / reach_mm) ** 2) + 1e-9 * np.eye(len(gap))
     )
     noise = sigma_mm * factor @ rng.standard_normal(len(gap))
     xy = xy + noise[:, None] * np.column_stack([-np.sin(theta), np.cos(theta)])
