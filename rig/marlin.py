@@ -186,7 +186,7 @@ class MarlinStage(SerialStage[MarlinSession]):
 
 def _question(session: MarlinSession, boot_s: float) -> tuple[str, list[str]]:
     """Wait for the board, then ask for firmware, settings and end stops."""
-    session.listen(min(boot_s, 2.5))
+    session.listen(min(boot_s, 2.5), boot_s)
     for attempt in range(3):
         try:
             lines = session.command("M115")

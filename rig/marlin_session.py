@@ -64,13 +64,17 @@ class MarlinSession:
         while (line := self._link.waiting_line()) is not None:
             self._note(line)
 
-    def listen(self, duration_s: float) -> list[str]:
-        """Read lines until it has been quiet for `duration_s`."""
-        lines = []
-        while (line := self._link.read_line(duration_s)) is not None:
+    def listen(self, quiet_s: float, most_s: float) -> None:
+        """Note lines until it is quiet for `quiet_s`; boards that never are: `most_s`.
+
+        An idle Marlin may say ``wait`` every second, or report temperatures unasked.
+        """
+        end_s = self._clock.monotonic_s() + most_s
+        while (left_s := end_s - self._clock.monotonic_s()) > 0.0:
+            line = self._link.read_line(min(quiet_s, left_s))
+            if line is None or line == "wait":
+                return
             self._note(line)
-            lines.append(line)
-        return lines
 
     def command(
         self,
@@ -151,11 +155,12 @@ class MarlinSession:
                 )
             if "busy: processing" in answer:
                 late_s = min(max(late_s, self._clock.monotonic_s() + limit_s), end_s)
-            elif not (answer == "ok" or answer.startswith("ok ")):
+            elif answer != "ok" and not answer.startswith("ok "):
                 lines.append(answer)
             elif mark in " ".join(lines):
                 self._in_step = True
-                return lines
+                # Some put the reply behind the ``ok``, others free buffer places.
+                return [*lines, answer[3:]] if answer[3:] else lines
         raise StageTimeoutError(
             f"the stage did not finish {line!r} within {limit_s:.0f} s"
         )

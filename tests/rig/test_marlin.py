@@ -36,6 +36,8 @@ class MarlinBoard:
         self._out: list[tuple[float, bytes]] = []
         self.x_mm = 37.0
         self.homed = self.silent = self.short = self.old = False
+        self.waits = self.place_in_ok = False
+        self.ok = "ok"
         self.seen: list[str] = []
         self.say("start\necho:Marlin 2.1.2.4", 0.5)
 
@@ -44,7 +46,10 @@ class MarlinBoard:
             self._out.append((at_s, line.encode() + b"\n"))
 
     def advance(self, duration_s: float) -> None:
+        before_s = self.now_s
         self.now_s += duration_s
+        if self.waits and int(self.now_s) > int(before_s):
+            self.say("wait", self.now_s)
 
     def read(self) -> bytes:
         ready = [data for time_s, data in self._out if time_s <= self.now_s]
@@ -88,8 +93,10 @@ class MarlinBoard:
             self._free_s = now
         elif line == "M114":
             steps = round(self.x_mm * 80)
-            self.say(f"X:{self.x_mm:.2f} Y:0.00 Z:0.00 E:0.00 Count X:{steps} Y:0", now)
-        self.say("ok", now)
+            place = f"X:{self.x_mm:.2f} Y:0.00 Z:0.00 E:0.00 Count X:{steps} Y:0"
+            self.say(f"ok {place}" if self.place_in_ok else place, now)
+        if not (line == "M114" and self.place_in_ok):
+            self.say(self.ok, now)
         self._last_s = now
 
 
@@ -104,6 +111,20 @@ def bench(tmp_path, monkeypatch):
     bounds = LimitsConfig(min_gap_mm=45.0, max_gap_mm=155.0)
     stage = GapStage(MarlinStage(config, clock), config, bounds, clock)
     return board, stage, clock
+
+
+@pytest.mark.parametrize(
+    "habit", [{"waits": True}, {"place_in_ok": True}, {"ok": "ok N0 P15 B3"}]
+)
+def test_habits_of_other_boards_are_understood(bench, habit):
+    # Each of them is OctoPrint's virtual printer in one of its settings.
+    board, stage, clock = bench
+    for name, value in habit.items():
+        setattr(board, name, value)
+    stage.connect()
+    assert clock.monotonic_s() < 15.0
+    stage.home()
+    assert stage.goto_gap(60.0).gap_mm == pytest.approx(60.0, abs=0.02)
 
 
 def test_it_homes_its_axis_alone_and_goes_to_gaps(bench):
