@@ -18,6 +18,7 @@ from ..core.specimen import Specimen
 from ..core.specimen_file import MagnetModel, SpecimenModel, read_specimen
 from ..core.toml import FileModel, line_of, read_text, read_toml
 from .stage_config import LimitsConfig, StageConfig
+from .virtual.fault_config import TwinConfig
 
 
 class CameraConfig(FileModel):
@@ -85,6 +86,7 @@ class RigModel(FileModel):
     meter: MeterConfig = MeterConfig()
     magnet: MagnetModel | None = None
     settle: SettleConfig | None = None
+    twin: TwinConfig = TwinConfig()
 
 
 class PlanModel(FileModel):

@@ -41,7 +41,7 @@ def make_manifest(plan: Plan, devices: Devices, *, twin: bool) -> Record:
         "created_utc": devices.utc(),
         "plan": plan.as_dict(),
         "specimen": specimen_dict(plan.specimen),
-        "rig": plan.rig.model_dump(mode="json"),
+        "rig": plan.rig.model_dump(mode="json", exclude={"twin"}),
         "devices": {
             "stage": dataclasses.asdict(devices.stage.identity),
             "stage_limits": dataclasses.asdict(devices.stage.limits),
@@ -52,6 +52,7 @@ def make_manifest(plan: Plan, devices: Devices, *, twin: bool) -> Record:
         "host": socket.gethostname(),
         "operator": plan.model.operator or _user(),
         "twin": twin,
+        "twin_faults": plan.rig.twin.model_dump(mode="json")["fault"] if twin else [],
     }
 
 

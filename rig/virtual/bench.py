@@ -13,6 +13,7 @@ from ..gap_stage import GapStage
 from ..grbl import GrblStage
 from ..link import WireLog
 from .camera import Render, VirtualCamera
+from .faults import TwinParts, schedule_faults
 from .grbl_board import GrblBoard
 from .meter import FluxAt, VirtualMeter
 from .plant import Plant
@@ -48,7 +49,8 @@ def open_twin(
     Parameters
     ----------
     rig : RigModel
-        The rig file; its port, camera source and meter port are not used.
+        The rig file; its port, camera source and meter port are not used, its table
+        ``[twin]`` says what goes wrong.
     render : callable
         ``render(gap_mm, time_s)`` returns the photograph.
     flux : callable
@@ -83,4 +85,6 @@ def open_twin(
     eye = VirtualCamera(render, gap_mm, clock, **{**swing, **(camera or {})})
     probe = VirtualMeter(flux, gap_mm, random.Random(seed), **(meter or {}))
     stage.connect()
+    parts = TwinParts(board=board, camera=eye, meter=probe, clock=clock, gap=gap_mm)
+    schedule_faults(rig.twin.fault, parts)
     return Devices(stage=stage, camera=eye, meter=probe, clock=clock)

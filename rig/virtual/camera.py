@@ -38,6 +38,11 @@ class VirtualCamera:
     faults : mapping of int to str
         Picture number to what happens there: ``stall`` (no picture ever again until
         reopened), ``dark`` (half the light).
+
+    Attributes
+    ----------
+    trouble : callable
+        Returns what is wrong with it now, or None.
     """
 
     def __init__(
@@ -63,6 +68,8 @@ class VirtualCamera:
         self._arrived_s = -math.inf
         self._number = 0
         self._newest: Frame | None = None
+        self._on_step: list[tuple[int, Callable[[], None]]] = []
+        self.trouble: Callable[[], CameraFault | None] = lambda: None
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -71,8 +78,15 @@ class VirtualCamera:
 
     def at_step(self, index: int, gap_mm: float) -> None:
         """Let the rod begin to swing: the stage arrived."""
-        del index, gap_mm
+        del gap_mm
         self._arrived_s = self._clock.monotonic_s()
+        for action in [action for step, action in self._on_step if step == index]:
+            action()
+        self._on_step = [item for item in self._on_step if item[0] != index]
+
+    def on_step(self, index: int, action: Callable[[], None]) -> None:
+        """Call `action` once, when the stage has arrived for a step of the plan."""
+        self._on_step.append((index, action))
 
     def grab_after(self, time_s: float, *, check: Check = go_on) -> Frame:
         """Return the first picture that begins after `time_s`.
@@ -85,7 +99,7 @@ class VirtualCamera:
         now_s = self._clock.monotonic_s()
         wait(self._clock, max(time_s - now_s, 0.0) + self._frame_s, check)
         self._number += 1
-        fault = self._faults.get(self._number)
+        fault = self._faults.get(self._number) or self.trouble()
         if fault == "stall":
             wait(self._clock, self._timeout_s, check)
             raise CameraError(

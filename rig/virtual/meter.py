@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Collection
-from typing import Any
+from typing import Any, Literal
 
 from ..clock import Check, go_on
 from ..meter import Flux, Sample, combine
 
+MeterFault = Literal["overload", "silent"]
 FluxAt = Callable[[float], float]
 """``flux(gap_mm)`` returns the flux density in mT at the probe."""
 
@@ -30,6 +31,11 @@ class VirtualMeter:
         From here on the meter says OL.
     silent_gaps_mm : collection of float
         Planned gaps at which it does not answer.
+
+    Attributes
+    ----------
+    trouble : callable
+        Returns what is wrong with it now, or None.
     """
 
     def __init__(
@@ -48,6 +54,7 @@ class VirtualMeter:
         self._noise_mT = noise_mT
         self._overload_mT = overload_mT
         self._silent_gaps_mm = frozenset(silent_gaps_mm)
+        self.trouble: Callable[[], MeterFault | None] = lambda: None
 
     @property
     def identity(self) -> dict[str, Any]:
@@ -57,7 +64,7 @@ class VirtualMeter:
     def read_flux(self, samples: int, *, gap_mm: float, check: Check = go_on) -> Flux:
         """Return the flux density at the present gap with noise."""
         check()
-        is_silent = gap_mm in self._silent_gaps_mm
+        is_silent = gap_mm in self._silent_gaps_mm or self.trouble() == "silent"
         return combine([self._sample(is_silent) for _ in range(samples)])
 
     def close(self) -> None:
@@ -67,7 +74,7 @@ class VirtualMeter:
         if is_silent:
             return Sample(outcome="silent")
         flux_mT = self._flux(self._gap()) + self._generator.gauss(0.0, self._noise_mT)
-        if abs(flux_mT) >= self._overload_mT:
+        if abs(flux_mT) >= self._overload_mT or self.trouble() == "overload":
             return Sample(outcome="overload", raw="OL")
         raw = f"{flux_mT:+.3f} mT"
         return Sample(outcome="ok", flux_mT=float(raw[:-3]), raw=raw)

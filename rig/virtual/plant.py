@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from ...core.checks import finite, positive
 
 Triple = tuple[float, float, float]
@@ -20,6 +22,11 @@ class Plant:
         A limit switch is closed at or above the one, at or below the other.
     backlash_mm : float
         Play between screw and carriage.
+
+    Attributes
+    ----------
+    stuck, is_blind : bool
+        All switches are closed; none ever closes.
     """
 
     def __init__(
@@ -38,7 +45,9 @@ class Plant:
         self._play_mm = finite(backlash_mm, "backlash_mm", "mm")
         self._steps = [0, 0, 0]
         self._carriage_mm = list(start_mm)
+        self._watchers: list[Callable[[], None]] = []
         self.stuck = False
+        self.is_blind = False
 
     @property
     def steps(self) -> tuple[int, int, int]:
@@ -58,11 +67,17 @@ class Plant:
         half = self._play_mm / 2.0
         here = self._carriage_mm[axis]
         self._carriage_mm[axis] = min(max(here, screw - half), screw + half)
+        for look in self._watchers:
+            look()
+
+    def watch(self, look: Callable[[], None]) -> None:
+        """Call `look` whenever a carriage has moved."""
+        self._watchers.append(look)
 
     def switches(self) -> int:
         """Return the closed limit switches as bits (1: X, 2: Y, 4: Z)."""
-        if self.stuck:
-            return 7
+        if self.stuck or self.is_blind:
+            return 7 if self.stuck else 0
         high, low = self._high_mm, self._low_mm
         x, y, z = self._carriage_mm
         return (
