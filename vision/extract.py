@@ -17,7 +17,7 @@ from .measurement import Measurement, failure
 from .photo import Photo
 from .quality import doubts, refusal
 from .refine import LostError, refine
-from .rod import Candidate, find_candidates
+from .rod import LEAST_SHARE, Candidate, find_candidates
 from .specimen_frame import Setting, measurement
 from .track import start_curve
 
@@ -138,8 +138,8 @@ def _choose(binary: Binary, clamp: Clamp) -> Candidate:
         rods = [item for item in find_candidates(at_level) if item.length_px > least]
         if not rods:
             continue
-        rod = rods[0]
-        _refuse_second(rods)
+        rod = _likeliest(rods)
+        _refuse_second(rod, rods)
         if rod.root != "free":
             return _accept(rod)
         best = best or rod
@@ -161,12 +161,22 @@ def _levels(binary: Binary) -> list[float]:
     return [*higher, first] if binary.inverted else [first, *higher]
 
 
-def _refuse_second(rods: list[Candidate]) -> None:
-    first = rods[0]
+def _likeliest(rods: list[Candidate]) -> Candidate:
+    """Return the longest, but rather one in a clamp than one from the border."""
+    clamped = [
+        rod
+        for rod in rods
+        if rod.root == "clamp" and rod.length_px > LEAST_SHARE * rods[0].length_px
+    ]
+    return clamped[0] if clamped else rods[0]
+
+
+def _refuse_second(first: Candidate, rods: list[Candidate]) -> None:
     alike = [
         other
-        for other in rods[1:]
-        if 0.5 < other.width_px / first.width_px < 2.0
+        for other in rods
+        if other is not first
+        and 0.5 < other.width_px / first.width_px < 2.0
         and other.length_px > 0.4 * first.length_px
     ]
     if len(alike) == 1:

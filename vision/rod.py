@@ -25,6 +25,12 @@ Root = Literal["clamp", "border", "free"]
 LEAST_SLENDERNESS = 6.0
 """Shortest rod, in widths."""
 
+LEAST_SHARE = 0.2
+"""Shortest rod beside another long thin thing, over the length of that."""
+
+_HALVED = 8
+"""Bins of log width from one width to half of it."""
+
 _PAD = 40
 """How far things are carried past the border of the picture."""
 
@@ -115,10 +121,31 @@ def _fill(
 
 
 def _thin_parts(roi: Mask, origin: tuple[int, int], binary: Binary) -> list[Candidate]:
+    """Return the thin parts of a thing: of the commonest width, or grown from that."""
     depth = _edge_distance(roi, origin, binary)
-    half = _ridge_half_width(depth)
-    if half is None:
-        return []
+    common, thinner = _ridge_half_widths(depth)
+    found = _of_width(roi, depth, common, origin, binary) if common else []
+    if not thinner:
+        return found
+    # A bar that reaches far into the picture is long and thin itself, but the clamp of
+    # a thinner one that grows from it.
+    longest = max((item.length_px for item in found), default=0.0)
+    palest = max((item.ratio for item in found), default=1.0)
+    grown = [
+        item
+        for item in _of_width(roi, depth, thinner, origin, binary)
+        if item.root == "clamp"
+        and item.length_px > LEAST_SHARE * longest
+        and item.ratio < palest + 0.1
+    ]
+    return grown or found
+
+
+def _of_width(
+    roi: Mask, depth: NDArray[np.float32], half: float, origin: tuple[int, int],
+    binary: Binary,
+) -> list[Candidate]:  # fmt: skip
+    """Return the parts of a thing that are about `half` wide to either side."""
     reach = 1.5 * half + 1.0
     fat = _near((depth > reach).view(np.uint8), reach + 1.0)
     thin = roi & ~fat & 1
@@ -182,18 +209,30 @@ def _near(core: Mask, reach: float) -> Mask:
     return near
 
 
-def _ridge_half_width(depth: NDArray[np.float32]) -> float | None:
-    """Return the half width that a long and thin part of the medial axis shares."""
+def _ridge_half_widths(depth: NDArray[np.float32]) -> tuple[float, float]:
+    """Return the half widths that long and thin parts of the medial axis share.
+
+    First the commonest for its width, then the commonest of much thinner ones; 0 where
+    there is none long enough.
+    """
     ridge = _ridge(np.ascontiguousarray(depth))
     if ridge.size < 8:
-        return None
+        return 0.0, 0.0
     bins = np.floor(np.log(ridge) / 0.09).astype(int)
     lowest = int(bins.min())
     bins -= lowest
     near = np.convolve(np.bincount(bins), [1, 1, 1, 1, 1], mode="same")
     width = np.exp(0.09 * (lowest + np.arange(len(near))))
-    best = int(np.argmax(near / np.sqrt(width)))
-    return float(np.median(ridge[np.abs(bins - best) <= 2]))
+    score = near / np.sqrt(width)
+    best = int(np.argmax(score))
+    common = float(np.median(ridge[np.abs(bins - best) <= 2]))
+    below = best - _HALVED
+    if below <= 0:
+        return common, 0.0
+    second = int(np.argmax(score[:below]))
+    if near[second] < 2.0 * LEAST_SLENDERNESS * width[second]:
+        return common, 0.0
+    return common, float(np.median(ridge[np.abs(bins - second) <= 2]))
 
 
 @njit(cache=True)

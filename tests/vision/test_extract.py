@@ -229,6 +229,19 @@ def test_clamps_of_any_colour_at_any_side(colour, heading, angle):
     assert result.length_mm == pytest.approx(30.0, abs=0.08)
 
 
+def test_arm_that_reaches_far_into_the_picture_is_the_clamp_not_the_rod():
+    what, camera = scene(BLACK, 0.0, 0.0, tilt_deg=0.0)
+    pose = Pose(x_mm=62.0, y_mm=-15.0, angle_deg=0.0, height_mm=0.9)
+    arm = Block(pose=pose, colour=BLACK, width_mm=6.0, length_mm=90.0)
+    bent = curve("arc", angle_deg=-170.0, length_mm=20.0)
+    bench = replace(what, clamp=arm, centreline=bent, side_mm=0.75)
+    picture = render_scene(bench, camera, np.random.default_rng(1))
+    result = extract(as_photo(picture), camera, rod_height_mm=0.9, clamp_height_mm=4.0)
+    assert result.ok, result.reason
+    assert result.length_mm == pytest.approx(20.0, abs=0.05)
+    assert result.width_mm == pytest.approx(0.75, abs=0.03)
+
+
 def test_empty_clamp_is_refused():
     what, camera = scene(BLACK, 0.0, 30.0)
     empty = render_scene(
