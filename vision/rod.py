@@ -192,7 +192,9 @@ def _edge_distance(
     depth = np.asarray(cv2.distanceTransform(grown, cv2.DIST_L2, 5))
     height, width = roi.shape
     inside = depth[before_y : before_y + height, before_x : before_x + width]
-    return np.asarray(inside * roi, dtype=np.float32)
+    inside[[0, -1]] = 0.0
+    inside[:, [0, -1]] = 0.0
+    return inside
 
 
 def _near(core: Mask, reach: float) -> Mask:
@@ -237,21 +239,27 @@ def _ridge_half_widths(depth: NDArray[np.float32]) -> tuple[float, float]:
 
 @njit(cache=True)
 def _ridge(depth: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the depths that no neighbour exceeds by more than 0.6."""
+    """Return the depths that no neighbour exceeds by more than 0.6.
+
+    The outermost pixels are a frame.
+    """
     height, width = depth.shape
     found = np.empty(height * width, dtype=np.float32)
     count = 0
-    for i in range(height):
-        for j in range(width):
-            here = depth[i, j]
-            if here < np.float32(0.9):
+    for i in range(1, height - 1):
+        above, row, below = depth[i - 1], depth[i], depth[i + 1]
+        for j in range(1, width - 1):
+            if row[j] < np.float32(0.9):
                 continue
-            top = here
-            for k in range(max(i - 1, 0), min(i + 2, height)):
-                for m in range(max(j - 1, 0), min(j + 2, width)):
-                    top = max(top, depth[k, m])
-            if here >= top - np.float32(0.6):
-                found[count] = here
+            most = row[j] + np.float32(0.6)
+            # One of the first four exceeds nearly every pixel that is none.
+            if (
+                row[j - 1] <= most and row[j + 1] <= most
+                and above[j] <= most and below[j] <= most
+                and above[j - 1] <= most and above[j + 1] <= most
+                and below[j - 1] <= most and below[j + 1] <= most
+            ):  # fmt: skip
+                found[count] = row[j]
                 count += 1
     return found[:count]
 
