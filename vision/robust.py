@@ -1,4 +1,4 @@
-"""Medians of what was found: quick, and deaf to NaN."""
+"""Medians and quantiles of what was found: quick, and deaf to NaN."""
 
 from __future__ import annotations
 
@@ -13,6 +13,16 @@ def median(values: NDArray[np.floating]) -> float:
     return float(_median(values))
 
 
+def quantile(values: NDArray[np.floating], part: float) -> float:
+    """Return the value that a part of an array is below, as `median` does."""
+    return float(_quantile(values, part))
+
+
 @njit(cache=True)
 def _median(values: NDArray[np.floating]) -> float:
     return float(np.nanmedian(values))
+
+
+@njit(cache=True)
+def _quantile(values: NDArray[np.floating], part: float) -> float:
+    return float(np.nanquantile(values, part))

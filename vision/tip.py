@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..core.jit import njit
 from .curve import Curve
 from .edges import _bilinear
+from .robust import median, quantile
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -184,13 +185,8 @@ def _rough_end(
     profile: Array, s: Array, expected: float, reach: float, near: float, inner: float
 ) -> float | None:
     """Find where the mean lane leaves the rod: the first time, going outwards."""
-    finite = np.isfinite(profile)
-    if finite.sum() < 8:
-        return None
-    start = s < expected - reach - near
-    rod = float(np.nanmedian(profile[start])) if (finite & start).any() else np.nan
-    beyond = profile[finite & (s > expected)]
-    paper = float(np.quantile(beyond, 0.75)) if beyond.size else np.nan
+    rod = median(profile[s < expected - reach - near])
+    paper = quantile(profile[s > expected], 0.75)
     if not paper > rod:
         return None
     above = (profile > 0.5 * (rod + paper)) & (s >= expected - reach)
