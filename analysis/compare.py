@@ -191,12 +191,12 @@ def compare_run(
     specimen : Specimen, optional
         The rod to simulate instead of the run's nominal one: a fitted one, say.
     support : Support, optional
-        Clamp angle, weight, load factor.
+        Clamp angle, weight, load factor; by default the weight of the run's bench.
     model : {"rod", "solid"}
         Rod theory (see `sim.solve`).
     """
     specimen = specimen or run.specimen
-    support = support or sim.Support()
+    support = support or run.support
     fit, magnet = fit_run_magnet(run)
     comparisons = [
         _compare(run, step, name, specimen, magnet, support, model)

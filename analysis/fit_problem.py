@@ -164,7 +164,7 @@ def build_problem(
         If the runs are of different materials or no step can be used.
     """
     nuisance = nuisance or Nuisance()
-    support = support or sim.Support()
+    support = support or common_support(runs)
     _check(runs, free, nuisance, support)
     shots: list[Shot] = []
     skipped: list[str] = []
@@ -209,6 +209,25 @@ def with_shared(problem: Problem, shared_mm: float) -> Problem:
         for shot in problem.shots
     )
     return replace(problem, shots=shots, shared_mm=shared_mm)
+
+
+def common_support(runs: Sequence[RunData]) -> sim.Support:
+    """Return the weight that the rig files of all runs tell.
+
+    Raises
+    ------
+    StoreError
+        If the bench of one of them stood otherwise.
+    """
+    support = runs[0].support
+    for run in runs:
+        if run.support != support:
+            raise StoreError(
+                f"{run.path}: weight acts along {run.support.gravity_m_s2} m/s2 on it, "
+                f"but along {support.gravity_m_s2} m/s2 on {runs[0].path} ([bench] up, "
+                "density_kg_m3): fit the two separately, or give --gravity-m-s2"
+            )
+    return support
 
 
 def _check(

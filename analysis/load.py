@@ -22,7 +22,9 @@ from ..core.errors import ConfigError, InputError, StoreError
 from ..core.magnet import Magnet
 from ..core.specimen import Specimen
 from ..core.specimen_file import MagnetModel, SpecimenModel
+from ..rig.config import BenchModel
 from ..rig.read_run import read_run
+from ..sim import Support
 from ..vision.calibration import Calibration
 from ..vision.measurement import Pose
 
@@ -128,6 +130,15 @@ class RunData:
     def label(self) -> str:
         """Name of the run folder: what tells runs apart in tables."""
         return self.path.resolve().name
+
+    @property
+    def support(self) -> Support:
+        """Weight as ``[bench]`` of the rig file tells it; none without a density."""
+        bench = (self.record.get("rig") or {}).get("bench")
+        if not bench:
+            return Support()
+        model = BenchModel.model_validate(bench)
+        return Support(gravity_m_s2=model.gravity_m_s2(self.specimen))
 
     @property
     def steps_table(self) -> pd.DataFrame:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..core.magnet import Magnet
+from ..core.magnet import Magnet, Vector
 from ..core.specimen import Specimen
-from ..sim import MagnetField, solve
+from ..sim import MagnetField, Support, solve
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,15 +32,21 @@ class StepPreview:
 
 
 def preview_plan(
-    specimen: Specimen, magnet: Magnet, gaps_mm: tuple[float, ...]
+    specimen: Specimen,
+    magnet: Magnet,
+    gaps_mm: tuple[float, ...],
+    *,
+    gravity_m_s2: Vector = (0.0, 0.0, 0.0),
 ) -> tuple[StepPreview, ...]:
     """Return what the simulator expects at each gap of a plan."""
     from ..sim import magnet_flux_mT
 
+    support = Support(gravity_m_s2=gravity_m_s2)
     steps = []
     length_mm = specimen.length_mm
     for gap_mm in gaps_mm:
-        found = solve(specimen, MagnetField(magnet=magnet, gap_mm=gap_mm))
+        place = MagnetField(magnet=magnet, gap_mm=gap_mm)
+        found = solve(specimen, place, support=support)
         field = magnet_flux_mT(
             magnet, [[length_mm, 0.0, 0.0]], length_mm=length_mm, gap_mm=gap_mm
         )[0]

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.magnet import Magnet
+from ..core.magnet import Magnet, Vector
 from ..core.specimen import Specimen
 from ..sim import MagnetField, Solution, Support, magnet_flux_mT, solve
 from ..vision.board import Board
@@ -99,6 +99,8 @@ class TwinBench:
         Given in place of the seeded one by tests that know what they hide.
     side_up_mm : float
         Clearance between the rod's lower face and the paper.
+    gravity_m_s2 : tuple of float
+        Free fall (x, y, z) in the specimen frame; it needs the rod's density.
     """
 
     def __init__(
@@ -109,12 +111,16 @@ class TwinBench:
         seed: int,
         truth: HiddenTruth | None = None,
         side_up_mm: float = 0.4,
+        gravity_m_s2: Vector = (0.0, 0.0, 0.0),
     ) -> None:
         self.specimen = specimen
         self.truth = truth or hide(specimen, magnet, seed=seed)
         self.board = Board()
         self.axis_height_mm = side_up_mm + specimen.side_mm / 2.0
         self._seed = seed
+        self._support = Support(
+            clamp_angle_deg=self.truth.clamp_angle_deg, gravity_m_s2=gravity_m_s2
+        )
         self._noise = np.random.default_rng([seed, 1])
         direction = math.radians(magnet.axis_angle_deg)
         self._approach = (-math.cos(direction), -math.sin(direction))
@@ -128,7 +134,7 @@ class TwinBench:
         return solve(
             self.truth.specimen,
             MagnetField(magnet=self.truth.magnet, gap_mm=gap_mm),
-            support=Support(clamp_angle_deg=self.truth.clamp_angle_deg),
+            support=self._support,
             points=241,
         )
 

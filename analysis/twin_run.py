@@ -57,7 +57,10 @@ def open_twin_bench(
             f"{plan.rig_path}: the twin bench needs a magnet; add the table [magnet] "
             f"with side_mm and remanence_T"
         )
-    bench = TwinBench(plan.specimen, plan.rig.magnet.magnet(), seed=seed)
+    bench = TwinBench(
+        plan.specimen, plan.rig.magnet.magnet(), seed=seed,
+        gravity_m_s2=plan.gravity_m_s2,
+    )  # fmt: skip
     devices = open_twin(
         plan.rig, bench.photograph, bench.flux_mT,
         seed=seed, clock=clock, log=log, camera=_SWING,

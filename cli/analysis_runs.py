@@ -26,7 +26,8 @@ _CLAMP = typer.Option(0.0, "--clamp-angle-deg", help="Direction of the clamp.")
 _GRAVITY = typer.Option(
     None,
     "--gravity-m-s2",
-    help="Weight x y z in the specimen frame; 0 0 -9.81 is a bench seen from above.",
+    help="Weight x y z in the specimen frame instead of [bench] of the rig file; "
+    "0 0 -9.81 is a bench seen from above.",
 )
 _LOAD = typer.Option(1.0, "--load-factor", help="Factor on the magnetic load.")
 
@@ -59,8 +60,7 @@ def compare(
     """Compare measured with simulated centrelines; write comparison.csv."""
     from ..analysis.compare import check_any, comparison_table, write_comparison
 
-    support = _support(clamp_angle_deg, gravity_m_s2, load_factor)
-    done = _compared(runs, support, model)
+    done = _compared(runs, model, clamp_angle_deg, gravity_m_s2, load_factor)
     for run in done:
         write_comparison(run.run.path / "comparison.csv", [run])
     if out is not None:
@@ -118,18 +118,21 @@ def fit(
 ) -> None:
     """Fit the moduli with uncertainties; write fit.json."""
     from ..analysis.fit import fit_runs, write_fit
+    from ..analysis.fit_problem import common_support
     from ..analysis.posterior import sample_posterior
     from ..analysis.probe import from_probe_reading
+    from ..sim import Support
 
     loaded = _loaded(runs)
     if probe_standoff_mm is not None:
         loaded = [from_probe_reading(run, probe_standoff_mm) for run in loaded]
+    told = Support() if gravity_m_s2 else common_support(loaded)
     result = fit_runs(
         loaded,
         model=_choice(field, ("magnet", "uniform"), "--field"),
         free=free,
         nuisance=_nuisance(hold, prior),
-        support=_support(clamp_angle_deg, gravity_m_s2, load_factor),
+        support=_support(told, clamp_angle_deg, gravity_m_s2, load_factor),
         prior_MPa=range_MPa,
         bounds_MPa=bounds_MPa,
         falling=falling,
@@ -170,9 +173,8 @@ def report(
     from ..analysis.report import write_report
     from ..analysis.report.figures import gmc_numbers
 
-    support = _support(clamp_angle_deg, gravity_m_s2, load_factor)
-    done = _compared(runs, support, model)
-    fits = [None if no_fit else try_fit(run.run, support) for run in done]
+    done = _compared(runs, model, clamp_angle_deg, gravity_m_s2, load_factor)
+    fits = [None if no_fit else try_fit(run.run, run.support) for run in done]
     path = out or (
         done[0].run.path / "report.html" if len(done) == 1 else Path("report.html")
     )
@@ -217,7 +219,7 @@ def export(
     """Export points, steps and comparisons as CSV, Parquet or MATLAB .mat."""
     from ..analysis.export import export_runs
 
-    done = _compared(runs, _support(0.0, None, 1.0), "rod")
+    done = _compared(runs, "rod")
     for path in export_runs(done, out):
         typer.echo(str(path))
 
@@ -308,32 +310,44 @@ def _loaded(paths: Sequence[Path]) -> list[RunData]:
 
 
 def _compared(
-    paths: Sequence[Path], support: Support, model: str
+    paths: Sequence[Path],
+    model: str,
+    clamp_angle_deg: float = 0.0,
+    gravity_m_s2: tuple[float, float, float] | None = None,
+    load_factor: float = 1.0,
 ) -> list[RunComparison]:
     from ..analysis.compare import compare_run
 
     _choice(model, ("rod", "solid"), "--model")
     loaded = _loaded(paths)
+
+    def compared(run: RunData) -> RunComparison:
+        support = _support(run.support, clamp_angle_deg, gravity_m_s2, load_factor)
+        return compare_run(run, support=support, model=model)
+
     if len(loaded) < 5:
-        return [compare_run(run, support=support, model=model) for run in loaded]
+        return [compared(run) for run in loaded]
     done = []
     with progress("compare") as tell:
         for run in loaded:
-            done.append(compare_run(run, support=support, model=model))
+            done.append(compared(run))
             tell(len(done), len(loaded))
     return done
 
 
 def _support(
+    told: Support,
     clamp_angle_deg: float,
     gravity_m_s2: tuple[float, float, float] | None,
     load_factor: float,
 ) -> Support:
-    from ..sim import Support
+    """Return what was asked for; without a word on weight, that of the run."""
+    from dataclasses import replace
 
-    return Support(
+    return replace(
+        told,
         clamp_angle_deg=clamp_angle_deg,
-        gravity_m_s2=gravity_m_s2 or (0.0, 0.0, 0.0),
+        gravity_m_s2=gravity_m_s2 or told.gravity_m_s2,
         load_factor=load_factor,
     )
 

@@ -25,7 +25,9 @@ def print_dry_run(plan: Plan, as_json: bool) -> None:
         from ..analysis.plan_preview import preview_plan
 
         magnet = plan.rig.magnet.magnet()
-        found = preview_plan(plan.specimen, magnet, plan.gaps_mm)
+        found = preview_plan(
+            plan.specimen, magnet, plan.gaps_mm, gravity_m_s2=plan.gravity_m_s2
+        )
         previews = dict(enumerate(found))
     total_s = homing_s(plan) + sum(step.time_s for step in steps)
     rows = []
@@ -46,16 +48,37 @@ def print_dry_run(plan: Plan, as_json: bool) -> None:
             }
         )
     if as_json:
-        print_json({"name": plan.model.name, "total_s": total_s, "steps": rows})
+        print_json(
+            {
+                "name": plan.model.name,
+                "total_s": total_s,
+                "gravity_m_s2": plan.gravity_m_s2,
+                "steps": rows,
+            }
+        )
         return
     typer.echo(f"{plan.model.name}: {plan.specimen.name} on {plan.rig.name}")
     typer.echo("step  gap mm  stage mm  move mm   time s  flux mT  tip x, y mm")
     for row in rows:
         typer.echo(_dry_line(row))
+    if plan.rig.magnet is not None:
+        typer.echo(_weight(plan))
     typer.echo(
         f"about {total_s / 60.0:.0f} min with homing; every gap is inside the limits; "
         f"nothing was moved"
     )
+
+
+def _weight(plan: Plan) -> str:
+    if any(plan.gravity_m_s2):
+        x, y, z = plan.gravity_m_s2
+        return f"predicted with weight: {x:.2f}, {y:.2f}, {z:.2f} m/s2 in x, y, z"
+    missing = (
+        "the rig file has no [bench] with up"
+        if plan.rig.bench is None
+        else "the specimen has no density_kg_m3"
+    )
+    return f"predicted without weight: {missing}"
 
 
 def _dry_line(row: dict[str, Any]) -> str:

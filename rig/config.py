@@ -6,6 +6,7 @@ inside a file are relative to that file.
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,9 +15,11 @@ from typing import Any, Literal
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
 from ..core.errors import ConfigError
+from ..core.magnet import Vector
 from ..core.specimen import Specimen
 from ..core.specimen_file import MagnetModel, SpecimenModel, read_specimen
 from ..core.toml import FileModel, line_of, read_text, read_toml
+from ..core.units import GRAVITY_M_PER_S2
 from .stage_config import LimitsConfig, StageConfig
 from .virtual.fault_config import TwinConfig
 
@@ -76,10 +79,35 @@ class AbortConfig(FileModel):
     policy: Literal["hold", "retract"] = "hold"
 
 
+class BenchModel(FileModel):
+    """The ``[bench]`` table: how the bench stands.
+
+    `up` points upward in the specimen frame (x along the undeformed rod, z toward the
+    camera); its length does not matter.
+    """
+
+    up: Vector
+
+    def model_post_init(self, _context: object) -> None:
+        """Check that there is a direction."""
+        length = math.hypot(*self.up)
+        if not 0.0 < length < math.inf:
+            raise ValueError("up must be a direction, such as [0.0, 0.0, 1.0]")
+
+    def gravity_m_s2(self, specimen: Specimen) -> Vector:
+        """Return the weight of a rod a kilogram, in m/s2; none without its density."""
+        if specimen.density_kg_m3 is None:
+            return (0.0, 0.0, 0.0)
+        scale = -GRAVITY_M_PER_S2 / math.hypot(*self.up)
+        x, y, z = self.up
+        return (scale * x + 0.0, scale * y + 0.0, scale * z + 0.0)  # no -0.0
+
+
 class RigModel(FileModel):
     """A rig file."""
 
     name: str = "bench"
+    bench: BenchModel | None = None
     stage: StageConfig
     limits: LimitsConfig
     camera: CameraConfig = CameraConfig()
@@ -142,6 +170,12 @@ class Plan:
     def gaps_mm(self) -> tuple[float, ...]:
         """The gaps in the order in which they are approached, in mm."""
         return tuple(self.model.gaps_mm)
+
+    @property
+    def gravity_m_s2(self) -> Vector:
+        """Free fall in the specimen frame, in m/s2; zero if the weight is not known."""
+        bench = self.rig.bench
+        return bench.gravity_m_s2(self.specimen) if bench else (0.0, 0.0, 0.0)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the plan as the manifest of a run keeps it, defaults written out."""

@@ -12,6 +12,11 @@ RIG = """\
 # Check it without moving anything:  magbend rig run plan.toml --dry-run
 name = "bench"
 
+[bench]
+# Which way is up, in the specimen frame: x along the undeformed rod, z to the camera.
+# It counts where the specimen has a density_kg_m3. A camera above: 0, 0, 1.
+up = [0.0, 0.0, 1.0]
+
 [stage]
 driver = "grbl"            # grbl (also grblHAL, FluidNC) or marlin
 {port}# auto, /dev/ttyUSB0, COM3, or serial:NUMBER of the USB chip
@@ -79,7 +84,7 @@ SPECIMEN = """\
 name = "GMC 2"
 side_mm = 1.0              # square cross-section
 remanence_mT = 20.07       # along the rod; + points root to tip
-# density_kg_m3 = 2640     # weight counts: give it if you know it
+# density_kg_m3 = 2640     # with it weight counts, as [bench] of the rig file says
 
 [[section]]                # root first
 length_mm = 10.0

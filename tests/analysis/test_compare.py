@@ -72,6 +72,43 @@ def test_a_scaled_line_has_the_errors_one_can_write_down(tmp_path: Path) -> None
         assert comparison.errors.tip_angle_deg == pytest.approx(0.0, abs=1e-6)
 
 
+def _stands(path: Path, up: list[float]) -> None:
+    """Write the bench's orientation into a run, as `magbend rig run` does."""
+    record = json.loads((path / "run.json").read_text())
+    record["rig"]["bench"] = {"up": up}
+    (path / "run.json").write_text(json.dumps(record))
+
+
+def test_weight_is_taken_from_the_run_unless_it_is_given(tmp_path: Path) -> None:
+    heavy = replace(sim.gmc(2), density_kg_m3=2640.0)
+    down = sim.Support(gravity_m_s2=(0.0, -9.80665, 0.0))
+    path = write_run(tmp_path / "a", specimen=heavy, support=down)
+    _stands(path, [0.0, 1.0, 0.0])
+    run = load_run(path)
+    assert run.support == down
+    for comparison in compare_run(run).of("magnet"):
+        assert comparison.errors is not None
+        assert comparison.errors.rms_mm < 1e-5
+    weightless = compare_run(run, support=sim.Support()).of("magnet")[0]
+    assert weightless.errors is not None
+    assert weightless.errors.tip_mm > 0.3
+    light = write_run(tmp_path / "b")
+    _stands(light, [0.0, 1.0, 0.0])
+    assert load_run(light).support == sim.Support()
+
+
+def test_runs_of_benches_that_stand_otherwise_are_not_fitted_as_one(
+    tmp_path: Path,
+) -> None:
+    from magbend.analysis.fit import fit_runs
+
+    heavy = replace(sim.gmc(2), density_kg_m3=2640.0)
+    paths = [write_run(tmp_path / name, specimen=heavy) for name in "ab"]
+    _stands(paths[1], [0.0, 0.0, 1.0])
+    with pytest.raises(StoreError, match=r"\[bench\] up"):
+        fit_runs([load_run(path) for path in paths])
+
+
 def test_grading_the_stiffness_makes_the_bend_more_circular(tmp_path: Path) -> None:
     for comparison in compare_run(load_run(write_run(tmp_path / "a"))).of("magnet"):
         assert comparison.simulated is not None

@@ -9,6 +9,8 @@ from magbend.rig.config import SettleConfig, read_plan, read_rig
 from magbend.rig.dry_run import homing_s, plan_steps
 from magbend.rig.template import write_templates
 
+from .conftest import RIG, SPECIMEN
+
 
 def test_a_plan_brings_its_rig_and_specimen(plan_file: Path) -> None:
     plan = read_plan(plan_file)
@@ -101,6 +103,57 @@ def test_the_dry_run_adds_up(plan_file: Path) -> None:
     # 10 mm at 5 mm/s, half a second to speed up and down, then the fixed times.
     assert steps[1].time_s > 2.5 + plan.settle.time_s
     assert homing_s(plan) > 0.0
+
+
+HEAVY = SPECIMEN.replace("side_mm = 1.0", "side_mm = 1.0\ndensity_kg_m3 = 2640.0")
+
+
+@pytest.mark.parametrize(
+    ("bench", "specimen", "gravity"),
+    [
+        ("", HEAVY, (0.0, 0.0, 0.0)),
+        ("[bench]\nup = [0, 0, 1]", SPECIMEN, (0.0, 0.0, 0.0)),
+        ("[bench]\nup = [0, 0, 1]", HEAVY, (0.0, 0.0, -9.80665)),
+        ("[bench]\nup = [-3, 0, 0]", HEAVY, (9.80665, 0.0, 0.0)),
+        ("[bench]\nup = [0, 3, 4]", HEAVY, (0.0, -5.88399, -7.84532)),
+    ],
+)
+def test_weight_is_how_the_bench_stands_and_what_the_rod_weighs(
+    plan_file, bench, specimen, gravity
+) -> None:
+    rig = plan_file.with_name("rig.toml")
+    rig.write_text(rig.read_text() + bench)
+    plan_file.with_name("specimen.toml").write_text(specimen)
+    assert read_plan(plan_file).gravity_m_s2 == pytest.approx(gravity)
+
+
+@pytest.mark.parametrize("up", ["[0, 0, 0]", "[0, 1]", "[nan, 0, 1]", '"up"'])
+def test_a_bench_that_has_no_up_is_refused(plan_file, up) -> None:
+    rig = plan_file.with_name("rig.toml")
+    rig.write_text(rig.read_text() + f"[bench]\nup = {up}\n")
+    with pytest.raises(ConfigError, match="bench"):
+        read_rig(rig)
+
+
+def test_the_dry_run_predicts_with_the_weight_of_the_bench(plan_file) -> None:
+    import json
+
+    from typer.testing import CliRunner
+
+    from magbend.cli.main import app
+
+    rig = plan_file.with_name("rig.toml")
+    plan_file.with_name("specimen.toml").write_text(HEAVY)
+    words = ["rig", "run", str(plan_file), "--dry-run"]
+
+    def tip_y_mm(up: str) -> float:
+        rig.write_text(RIG + f"[bench]\nup = {up}\n")
+        result = CliRunner().invoke(app, [*words, "--json"])
+        return json.loads(result.stdout)["steps"][0]["predicted_tip_y_mm"]
+
+    above, on_edge, turned = map(tip_y_mm, ("[0, 0, 1]", "[0, 1, 0]", "[0, -1, 0]"))
+    assert on_edge < above < turned
+    assert "with weight: 0.00, 9.81, 0.00" in CliRunner().invoke(app, words).stdout
 
 
 @pytest.mark.parametrize("twin", [False, True])
