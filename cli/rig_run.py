@@ -185,10 +185,11 @@ def init(
 
 
 def _report(line: str) -> None:
-    """Write a line above the progress bar; a leading bell is rung."""
-    if line.startswith("\a") and sys.__stderr__ is not None:
-        sys.__stderr__.write("\a")  # the bar's own stream would strip it
-        sys.__stderr__.flush()
+    """Write a line above the progress bar; a leading bell is rung in a terminal."""
+    terminal = sys.__stderr__
+    if line.startswith("\a") and terminal is not None and terminal.isatty():
+        terminal.write("\a")  # the bar's own stream would strip it
+        terminal.flush()
     sys.stderr.write(line.lstrip("\a") + "\n")
 
 

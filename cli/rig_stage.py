@@ -123,6 +123,8 @@ def goto(
 
     with _connected(rig, port, log) as stage:
         stage.check_gap(gap_mm)
+        if feed_mm_min is not None:
+            stage.check_feed(feed_mm_min)
         with _told_how_to_go_on(stage):
             if home_first and stage.position_state != "homed":
                 typer.echo("homing; Ctrl-C stops it at once", err=True)

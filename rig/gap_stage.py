@@ -128,7 +128,7 @@ class GapStage:
         """
         self._stage.connect()
         try:
-            check_feed(self._config.feed_mm_min, self._bounds, self._stage.limits)
+            self.check_feed(self._config.feed_mm_min)
             check_range(self.range_mm())
         except InterlockError:
             self._stage.close()
@@ -202,6 +202,16 @@ class GapStage:
         slack_mm = self._stage.limits.step_mm / 2.0
         check_gap(gap_mm, self._bounds, self.range_mm(), slack_mm)
 
+    def check_feed(self, feed_mm_min: float) -> None:
+        """Refuse a speed that the controller has not, or that leaves no room to stop.
+
+        Raises
+        ------
+        InterlockError
+            As it says; nothing is sent.
+        """
+        check_feed(feed_mm_min, self._bounds, self._stage.limits)
+
     def goto_gap(
         self,
         gap_mm: float,
@@ -234,7 +244,7 @@ class GapStage:
         """
         self.check_gap(gap_mm)
         feed = self._config.feed_mm_min if feed_mm_min is None else feed_mm_min
-        check_feed(feed, self._bounds, self._stage.limits)
+        self.check_feed(feed)
         self._require_homed()
         here = self._here_mm()
         legs, approach = self._legs(here, gap_mm)

@@ -1,8 +1,9 @@
 """What GRBL 1.1 says, line by line, as values: no port, no time, no state.
 
 Tolerates grblHAL and FluidNC: unknown fields of a report are skipped, names and
-decimals may differ. Sources: gnea/grbl 1.1h, ``doc/markdown/interface.md`` and the
-recorded dialogue of a real board in ``fixtures/rig``.
+decimals may differ. Sources: gnea/grbl 1.1h, ``doc/markdown/interface.md``; for alarms
+above 9 also grblHAL's ``alarms.h`` and FluidNC's; the recorded dialogue of a real board
+in ``fixtures/rig``.
 """
 
 from __future__ import annotations
@@ -80,7 +81,19 @@ ALARMS: dict[int, AlarmText] = {
         remedy="check switch, cable and $23 (a stock build homes Z, then X and Y: "
         "each needs its switch), then home (magbend rig home)",
     ),
-    10: AlarmText(meaning="the second motor of a dual axis did not home", remedy=_HOME),
+    # From here on each firmware has a meaning of its own: GRBL; grblHAL; FluidNC.
+    10: AlarmText(
+        meaning="a dual axis did not home; the emergency stop is pressed; the spindle",
+        remedy="release the stop, " + _HOME,
+    ),
+    11: AlarmText(
+        meaning="grblHAL wants homing first; FluidNC sees an active input at start",
+        remedy="look at switches and buttons, then home (magbend rig home)",
+    ),
+    12: AlarmText(
+        meaning="a limit switch is closed",
+        remedy="free the switch by hand, then home (magbend rig home)",
+    ),
 }
 
 

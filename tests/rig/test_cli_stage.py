@@ -74,6 +74,12 @@ def test_goto_homes_first_if_told(bench_folder):
     assert "gap 110.000 mm" in rig("goto", "110", "--home")
 
 
+def test_goto_refuses_a_speed_before_it_homes():
+    with pytest.raises(MagbendError, match="at most the controller's"):
+        rig("goto", "110", "--home", "--feed-mm-min", "9000")
+    assert json.loads(rig("status", "--json"))["position_state"] == "unknown"
+
+
 def test_unlock_asks_and_does_what_it_is_told():
     runner = CliRunner()
     assert "still locked" in runner.invoke(app, ["rig", "unlock"], input="n\n").output

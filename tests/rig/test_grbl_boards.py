@@ -323,6 +323,34 @@ def test_a_board_that_cannot_be_used_is_named(answers, sentence):
     assert clock.monotonic_s() < 30.0
 
 
+GRBLHAL = {
+    b"?": b"<Alarm:11|MPos:0.000,0.000,0.000|Bf:100,1023|FS:0,0|A:|FW:grblHAL>\r\n",
+    b"\x18": b"\r\nGrblHAL 1.1f ['$' or '$HELP' for help]\r\nALARM:11\r\n",
+    b"$I": b"[VER:1.1f.20231210:]\r\n[OPT:VNMSL,100,1024,3,0]\r\nok\r\n",
+    b"$G": b"[GC:G0 G54 G17 G21 G90 G94]\r\nok\r\n",
+    b"$#": b"ok\r\n",
+    b"$$": b"$1=255\r\n$20=1\r\n$21=1\r\n$22=7\r\n$23=0\r\n$27=1.000\r\n"
+    b"$100=250.000\r\n$110=500.000\r\n$120=10.000\r\n$130=180.000\r\nok\r\n",
+}
+
+
+def test_a_grblhal_that_wants_homing_first_is_homed():
+    clock, board = SteppedClock(), OldBoard(dict(GRBLHAL))
+    config = _config(port=register_board("hal", board, clock), home_command="$HX")
+    stage = GrblStage(config, clock)
+    stage.connect()
+    status = stage.status()
+    assert (status.state, status.substate) == ("alarm", 11)
+    assert stage.position_state == "unknown"
+    board.answers |= {
+        b"?": b"<Idle|MPos:-1.000,0.000,0.000|Bf:100,1023|FS:0,0>\r\n",
+        b"$HX": b"ok\r\n",
+    }
+    board.answers[b"\x18"] = board.answers[b"\x18"].replace(b"ALARM:11\r\n", b"")
+    stage.home()
+    assert stage.position_state == "homed"
+
+
 def test_a_locked_board_cannot_be_given_a_gap_and_says_the_way_out():
     bench = make_bench(homing="manual")
     bench.stage.connect()

@@ -143,6 +143,20 @@ def test_space_stops_a_jog_and_ctrl_c_leaves(terminal, tmp_path):
     assert "Traceback" not in screen.seen
 
 
+def test_the_bell_rings_in_a_terminal_only(monkeypatch, capsys):
+    import io
+
+    from magbend.cli.rig_run import _report
+
+    for is_terminal, heard in ((True, "\a"), (False, "")):
+        terminal = io.StringIO()
+        monkeypatch.setattr(terminal, "isatty", lambda told=is_terminal: told)
+        monkeypatch.setattr(sys, "__stderr__", terminal)
+        _report("\apaused")
+        assert terminal.getvalue() == heard
+        assert capsys.readouterr().err == "paused\n"
+
+
 # Windows, by injection: what msvcrt gives, one character a call.
 
 
