@@ -280,6 +280,16 @@ class GapStage:
             pins=status.pins,
         )
 
+    def listen(self) -> None:
+        """Take in what the controller says unasked, while the stage stands.
+
+        Raises
+        ------
+        AlarmError, PositionLostError, LinkLostError
+            If it raised an alarm, restarted, or is gone.
+        """
+        self._stage.listen()
+
     def stop_requested(self) -> bool:
         """Return whether ``magbend rig stop`` asks this process to stop."""
         return self._stage.stop_requested()

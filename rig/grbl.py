@@ -160,6 +160,22 @@ class GrblStage(SerialStage[GrblSession]):
             raw=report.raw if report else "",
         )
 
+    def listen(self) -> None:
+        """Take in what the board says unasked; nothing is sent.
+
+        Raises
+        ------
+        AlarmError, PositionLostError, LinkLostError
+            If it raised an alarm, restarted, or is gone.
+        """
+        session = self._require_session()
+        restarts = session.restarts
+        session.drain()
+        note(session, self._trust)
+        if session.alarm is not None:
+            raise session.alarm_error(session.alarm)
+        session.raise_if_restarted(restarts)
+
     def hold(self) -> None:
         """Feed hold, wait for standstill, forget the rest; the position stays good.
 

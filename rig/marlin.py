@@ -111,6 +111,23 @@ class MarlinStage(SerialStage[MarlinSession]):
             trouble=trouble if lost else None,
         )
 
+    def listen(self) -> None:
+        """Take in what the board says unasked; nothing is sent.
+
+        Raises
+        ------
+        PositionLostError, LinkLostError
+            If it restarted or was halted, or is gone.
+        """
+        session = self._require_session()
+        restarts = session.restarts
+        session.drain()
+        self._note(session)
+        if session.restarts != restarts or session.halted:
+            raise PositionLostError(
+                "the board restarted or was halted; home it (magbend rig home)"
+            )
+
     def hold(self) -> None:
         """Let the short piece that runs come to its end; the position stays good.
 

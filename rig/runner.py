@@ -249,9 +249,10 @@ class _Session:
         return self.control.wait_while_paused(self.report, check=self._check)
 
     def _check(self) -> None:
-        """End the run if somebody asked for it while the stage stands."""
+        """End the run if somebody asks for it, or the stage says it lost itself."""
         if self.devices.stage.stop_requested():
             raise StoppedError("the run was stopped by magbend rig stop")
+        self.devices.stage.listen()
 
     def _require_standing(self, move: MoveRecord) -> None:
         """Refuse a photograph during which the stage moved, or lost itself."""

@@ -123,6 +123,7 @@ def _standing_at_the_end(stage: GapStage, path: Path) -> Iterator[Check]:
         def check() -> None:
             if stage.stop_requested():
                 raise StoppedError("the scan was stopped by magbend rig stop")
+            stage.listen()
 
         try:
             with received.striking():

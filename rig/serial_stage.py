@@ -116,6 +116,10 @@ class SerialStage(ABC, Generic[Session]):
         """Go there, a short way, and return when the stage stands there."""
 
     @abstractmethod
+    def listen(self) -> None:
+        """Take in what the board says unasked; raise if it lost its position."""
+
+    @abstractmethod
     def hold(self) -> None:
         """Bring to a stand what moves, and forget the rest; the position stays good."""
 

@@ -208,6 +208,10 @@ class Stage(Protocol):
         """Ask the controller; a silent controller is a status, not an error."""
         ...
 
+    def listen(self) -> None:
+        """Take in what the controller says unasked; raise if it lost its position."""
+        ...
+
     def stop_requested(self) -> bool:
         """Return whether another process asks this one to stop the stage."""
         ...

@@ -115,6 +115,9 @@ class FakeStage:
             position_state=self.position_state,
         )
 
+    def listen(self) -> None:
+        pass
+
     def stop_requested(self) -> bool:
         return self.is_stop_asked
 

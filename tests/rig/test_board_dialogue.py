@@ -6,6 +6,9 @@ came back must come back, in the same order. What may differ is said here and co
 * while the stage moves, the numbers of MPos, FS and the planner count (the recorder's
   machine ran up to three times slow, so "when" is taken from the recorded position);
 * where a move was cut off, the place it stopped at: learnt once, then to the micron.
+
+Every line must come when it came there, counted from the host's bytes or the line
+before it, within a factor of four: the recorder's machine was busy and that slow.
 """
 
 from __future__ import annotations
@@ -28,6 +31,8 @@ STOP_SYNC_MM = 0.035  # half of a segment of 10 ms at 5 mm/s
 POSITION_MM = 0.12
 FEED_MM_MIN = 30.0
 STOP_MM = 4.5
+SLOWNESS = 4.0
+SLACK_S = 0.15
 ROW = re.compile(r"^\s*(\d+\.\d+) (>>|<<|##|--|!!) (.*)$")
 
 
@@ -62,10 +67,37 @@ def moving(report: Report) -> bool:
     return report.state in MOVING or (report.state == "hold" and report.substate == 1)
 
 
+@dataclass(frozen=True)
+class Delay:
+    """How long after the host's last bytes, and after the line before, a line came."""
+
+    line: str
+    sent_s: float
+    line_s: float
+
+
+def alike(a_s: float, b_s: float) -> bool:
+    return a_s <= SLOWNESS * b_s + SLACK_S and b_s <= SLOWNESS * a_s + SLACK_S
+
+
+def recorded_delays(rows: list[Row]) -> list[Delay]:
+    delays = []
+    sent_s = line_s = rows[0].time_s
+    for row in rows:
+        if row.kind == "<<":
+            line = row.data.decode()
+            delays.append(Delay(line, row.time_s - sent_s, row.time_s - line_s))
+            line_s = row.time_s
+        elif row.kind in (">>", "##"):
+            sent_s = row.time_s
+    return delays
+
+
 @dataclass
 class Score:
     exact: int = 0
     tolerant: int = 0
+    late: list[str] = field(default_factory=list)
 
 
 class Replay:
@@ -82,9 +114,10 @@ class Replay:
             self.board.advance(0.2)
             self.board.read()
             self.shift = 0.0
-        self.heard = ""
+        self.heard: list[Delay] = []
+        self.tail = ""
+        self.sent_s = self.line_s = self.board.now_s
         rows = section.rows
-        wanted = [r.data.decode() for r in rows if r.kind == "<<"]
         last_s = rows[0].time_s
         due = 0
         for index, row in enumerate(rows):
@@ -97,9 +130,10 @@ class Replay:
             elif row.kind == "<<":
                 due += 1
         self._pass_time(3.0, due, [])
-        self.scores[section.name] = self._compare(section.name, wanted)
+        self.scores[section.name] = self._compare(section.name, recorded_delays(rows))
 
     def _do(self, row: Row) -> None:
+        self.sent_s = self.board.now_s
         if row.kind == ">>":
             self.board.receive(row.data)
         elif "toggle" in row.text:
@@ -109,8 +143,13 @@ class Replay:
             self.shift = 0.0
 
     def _lines(self) -> int:
-        self.heard += self.board.read().decode()
-        return self.heard.count("\n")
+        now_s = self.board.now_s
+        *lines, self.tail = (self.tail + self.board.read().decode()).split("\n")
+        for line in lines:
+            delay = Delay(line + "\n", now_s - self.sent_s, now_s - self.line_s)
+            self.heard.append(delay)
+            self.line_s = now_s
+        return len(self.heard)
 
     def _pass_time(self, duration_s: float, due: int, ahead: list[Row]) -> None:
         """Wait as the recording did, or until the stage is where it was then."""
@@ -119,7 +158,9 @@ class Replay:
             self.board.advance(0.001)
         goal = self._goal(ahead)
         if goal is None:
-            self.board.advance(max(end_s - self.board.now_s, 0.0))
+            while self.board.now_s < end_s:
+                self.board.advance(min(end_s - self.board.now_s, 0.01))
+                self._lines()
         else:
             limit_s = self.board.now_s + 5.0
             while self.board.now_s < limit_s and not self._reached(*goal):
@@ -165,14 +206,18 @@ class Replay:
             here += sign * (mover.speed_mm_s**2 / 20.0 + mover.prepared_mm)
         return (place - here) * sign <= (STOP_SYNC_MM if kind == "stop" else 1e-6)
 
-    def _compare(self, name: str, wanted: list[str]) -> Score:
-        got = self.heard.splitlines(keepends=True)
+    def _compare(self, name: str, wanted: list[Delay]) -> Score:
+        got = self.heard
         if name == "Y":  # the recorder left out the rows between
-            got = [g for g in got if not g.startswith("$") or g[:3] in ("$0=", "$10")]
-            got = [g for g in got if not g.startswith(("$10=", "$101", "$102"))]
+            kept = ("$0=", "$100")
+            got = [g for g in got if g.line[0] != "$" or g.line.startswith(kept)]
         assert len(got) == len(wanted), (name, got, wanted)
         score = Score()
-        for mine, real in zip(got, wanted, strict=True):
+        for mine_at, real_at in zip(got, wanted, strict=True):
+            mine, real = mine_at.line, real_at.line
+            in_time = alike(mine_at.sent_s, real_at.sent_s)
+            if not (in_time or alike(mine_at.line_s, real_at.line_s)):
+                score.late.append(f"section {name}: {mine_at} for {real_at}")
             if mine == real:
                 score.exact += 1
             else:
@@ -219,6 +264,10 @@ def test_every_section_is_reproduced(sections, capsys):
         )
     exact = sum(s.exact for s in replay.scores.values())
     tolerant = sum(s.tolerant for s in replay.scores.values())
+    late = [line for score in replay.scores.values() for line in score.late]
+    with capsys.disabled():
+        print(f"in time (factor {SLOWNESS:g}): {exact + tolerant - len(late)}")
+    assert late == []
     assert len(replay.scores) == 24
     assert exact + tolerant == 433
     assert tolerant <= 48

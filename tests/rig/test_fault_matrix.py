@@ -239,6 +239,31 @@ def test_a_restart_without_homing_is_noticed(plan_file: Path, tmp_path: Path) ->
     assert verify_run(out) == []
 
 
+@pytest.mark.parametrize(
+    "action", [stuck, lambda rig: rig.board.power_cycle(), unplug],
+    ids=["alarm", "restart", "unplugged"],
+)  # fmt: skip
+def test_a_fault_in_a_long_settling_time_is_noticed_within_a_second(
+    action: Callable[[Rig], object], plan_file: Path, tmp_path: Path
+) -> None:
+    text = plan_file.read_text()
+    plan_file.write_text(re.sub(r"\ntime_s = .*", "\ntime_s = 15.0", text))
+    rig = Rig(read_plan(plan_file))
+    devices = rig.open()
+    struck_s = []
+
+    def strike(rig: Rig) -> None:
+        action(rig)
+        struck_s.append(rig.clock.monotonic_s())
+
+    standing(strike)(rig)
+    ended_s = []
+    devices.stage.hold = lambda: ended_s.append(rig.clock.monotonic_s())
+    summary = run(rig.plan, devices, tmp_path / "out", twin=True)
+    assert (summary.status, summary.steps_done) == ("fail", 1)
+    assert ended_s[0] - struck_s[0] < 1.0
+
+
 def test_device_faults_that_are_flags_and_failures(
     plan_file: Path, tmp_path: Path
 ) -> None:

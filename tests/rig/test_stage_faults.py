@@ -265,3 +265,22 @@ def test_every_cell_of_the_matrix_is_counted(capsys):
             f"{len(TOLERATED) + 1} that do not"
         )
     assert len(MOVE_FAULTS) >= 10
+
+
+UNASKED: dict[str, tuple[Callable[[StageBench], object], type[BaseException]]] = {
+    "a switch closes": (_switch, AlarmError),
+    "the board restarts": (lambda b: b.board.power_cycle(), PositionLostError),
+    "the cable is pulled": (_unplug, LinkLostError),
+}
+
+
+@pytest.mark.parametrize("name", UNASKED)
+def test_what_happens_while_the_stage_stands_is_heard_unasked(name):
+    action, error = UNASKED[name]
+    bench = homed_bench()
+    bench.stage.listen()
+    action(bench)
+    with pytest.raises(error):
+        for _ in range(5):
+            bench.clock.sleep(0.1)
+            bench.stage.listen()
