@@ -280,7 +280,11 @@ def test_what_happens_while_the_stage_stands_is_heard_unasked(name):
     bench = homed_bench()
     bench.stage.listen()
     action(bench)
-    with pytest.raises(error):
+
+    def listen_for_half_a_second() -> None:
         for _ in range(5):
             bench.clock.sleep(0.1)
             bench.stage.listen()
+
+    with pytest.raises(error):
+        listen_for_half_a_second()
