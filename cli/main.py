@@ -49,6 +49,10 @@ def options(
     """Options of every command."""
     if debug:
         os.environ["MAGBEND_DEBUG"] = "1"
+        return
+    # OpenCV and its FFmpeg tell of damaged files at length; ours is one sentence.
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "SILENT")
+    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 
 def main() -> None:

@@ -51,7 +51,7 @@ def list_sources(paths: Iterable[Path]) -> list[Source]:
     Raises
     ------
     VisionError
-        If a path is missing, a folder has no picture, or a video cannot be opened.
+        If a path is missing or a folder has no picture.
     """
     sources: list[Source] = []
     for path in paths:
@@ -98,7 +98,7 @@ def _of_video(path: Path) -> list[Source]:
     finally:
         video.release()
     if count <= 0:
-        raise VisionError(f"{path}: this video cannot be opened or has no frames")
+        return [Source(image=path.name, path=path, frame=0)]  # fails in its row
     return [
         Source(image=f"{path.stem}_{frame:06d}", path=path, frame=frame)
         for frame in range(count)
@@ -144,7 +144,12 @@ def read_source(source: Source) -> Photo:
     """
     if source.frame is None:
         return read_photo(source.path)
-    pixels = _video(source.path).read(source.frame)
+    video = _video(source.path)
+    if not video.opened:
+        raise VisionError(
+            f"{source.path.name}: this video cannot be opened or has no frames"
+        )
+    pixels = video.read(source.frame)
     if pixels is None:
         raise VisionError(
             f"{source.path.name}: frame {source.frame} cannot be decoded; "
@@ -172,6 +177,11 @@ class _Video:
     def __init__(self, path: Path) -> None:
         self._video: Any = cv2.VideoCapture(str(path))
         self._next = 0
+
+    @property
+    def opened(self) -> bool:
+        """Whether the decoder took the file."""
+        return bool(self._video.isOpened())
 
     def read(self, frame: int) -> np.ndarray | None:
         """Return one frame, blue green red; None where it cannot be decoded."""

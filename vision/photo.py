@@ -102,10 +102,13 @@ def decode_photo(data: bytes, *, source: str = "data", linear: bool = False) -> 
     if not data:
         raise VisionError(f"{source}: the file is empty; copy it from the camera again")
     _check_whole(data, source)
-    alpha = data[:8] == _PNG and len(data) > 25 and data[25] in (4, 6)
-    flags = (
-        cv2.IMREAD_UNCHANGED if alpha else cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH
-    )
+    pixels = _decode(data, source, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH)
+    if data[:8] == _PNG and data[25] in (4, 6):
+        pixels = _with_alpha(data, source, pixels)
+    return as_photo(pixels, source=source, linear=linear)
+
+
+def _decode(data: bytes, source: str, flags: int) -> NDArray[Any]:
     try:
         pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
     except cv2.error:
@@ -115,7 +118,21 @@ def decode_photo(data: bytes, *, source: str = "data", linear: bool = False) -> 
             f"{source}: not a picture that can be decoded; "
             "give a PNG, JPEG, TIFF or BMP file"
         )
-    return as_photo(pixels, source=source, linear=linear)
+    return np.asarray(pixels)
+
+
+def _with_alpha(data: bytes, source: str, upright: NDArray[Any]) -> NDArray[Any]:
+    """Return a PNG with its transparency, which OpenCV never turns as EXIF asks."""
+    pixels = _decode(data, source, cv2.IMREAD_UNCHANGED)
+    alpha = pixels[..., -1]
+    if int(alpha.min()) == np.iinfo(alpha.dtype).max:
+        return upright
+    if b"eXIf" in data:
+        raise VisionError(
+            f"{source}: is partly transparent, and EXIF may turn it; "
+            "save it without transparency"
+        )
+    return pixels
 
 
 def as_photo(

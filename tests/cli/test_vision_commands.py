@@ -225,6 +225,24 @@ def test_help_names_an_example_and_loads_nothing_heavy():
     assert "Example: magbend vision extract" in done.stdout
 
 
+def test_decoders_of_damaged_files_keep_quiet(calibration, tmp_path):
+    cut = tmp_path / "cut.tif"
+    cut.write_bytes(b"II*\0" + (8).to_bytes(4, "little") + b"\x09\0" * 20)
+    words = ["vision", "extract", str(cut), "--calibration", str(calibration)]
+    program = (
+        "import sys; from magbend.cli.main import main\n"
+        f"sys.argv = ['magbend', *{[*words, '--out', str(tmp_path / 'out')]!r}]\n"
+        "main()\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    last = done.stderr.splitlines()[-1]
+    assert last.startswith("magbend: none of the 1 photographs could be measured")
+    assert "TIFF_" not in done.stderr
+
+
 def test_a_rod_above_the_camera_is_refused(magbend, calibration, tmp_path):
     code, _, messages = magbend(
         "vision", "extract", RENDERED / "dev_03.jpg", "--calibration", calibration,

@@ -319,6 +319,18 @@ def test_file_that_is_no_video_is_refused(tmp_path):
         extract_files([path], tmp_path / "out", settings=SETTINGS)
 
 
+def test_a_broken_video_costs_its_row_and_not_the_batch(tmp_path, good):
+    broken = tmp_path / "cut.mp4"
+    broken.write_bytes(b"\0\0\0\x18ftypisom" + b"0" * 400)
+    picture = save(tmp_path / "a.png", good.image)
+    files = [broken, picture]
+    result = extract_files(files, tmp_path / "out", settings=SETTINGS)
+    first, second = result.frames
+    assert (first.image, first.status) == ("cut.mp4", "failed")
+    assert "cannot be opened" in first.reason
+    assert second.ok
+
+
 def test_bare_frame_divides_the_light_out(tmp_path, good):
     x = np.linspace(1.0, 0.25, SIZE[0])[None, :]
     stained = np.clip(good.image * x ** (1 / 2.2), 0, 255).astype(np.uint8)

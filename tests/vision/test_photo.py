@@ -76,6 +76,20 @@ def test_exif_orientation_is_applied():
     assert decode_photo(buffer.getvalue()).size_px == (64, 256)
 
 
+def test_exif_turns_a_png_with_transparency_or_it_is_refused():
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    pixels = np.dstack([RAMP, RAMP, RAMP, np.full_like(RAMP, 255)])
+    buffer = io.BytesIO()
+    Image.fromarray(pixels).save(buffer, "PNG", exif=exif)
+    assert decode_photo(buffer.getvalue()).size_px == (64, 256)
+    pixels[0, 0, 3] = 0
+    buffer = io.BytesIO()
+    Image.fromarray(pixels).save(buffer, "PNG", exif=exif)
+    with pytest.raises(VisionError, match="without transparency"):
+        decode_photo(buffer.getvalue())
+
+
 def test_cmyk_jpeg_is_read():
     buffer = io.BytesIO()
     Image.new("CMYK", (64, 48), (0, 0, 0, 0)).save(buffer, "JPEG", quality=95)
