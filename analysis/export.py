@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from ..core.errors import InputError, MissingExtraError
-from ..core.files import write_bytes, write_text
+from ..core.files import output_file, output_folder, write_bytes, write_text
 from .compare import RunComparison, comparison_table
 
 if TYPE_CHECKING:
@@ -92,23 +92,39 @@ def export_runs(runs: Sequence[RunComparison], out: Path) -> list[Path]:
     MissingExtraError
         If Parquet is asked for and pyarrow is not installed.
     """
+    ending = check_export(out)
+    data = tables(runs)
+    if not ending:
+        written = _write(data, out / "runs.csv", ".csv")
+        if _has_parquet():
+            written += _write(data, out / "runs.parquet", ".parquet")
+        return written + _write(data, out / "runs.mat", ".mat")
+    return _write(data, out, ending)
+
+
+def check_export(out: Path) -> str:
+    """Return the ending of an export, empty for a folder; call it before the work.
+
+    Raises
+    ------
+    InputError
+        If the ending is none of `FORMATS`, or nothing can be written there.
+    MissingExtraError
+        If Parquet is asked for and pyarrow is not installed.
+    """
     ending = out.suffix.lower()
     if ending and ending not in FORMATS:
         raise InputError(
             f"export must end in {', '.join(FORMATS)} or be a folder; "
             f"instead received {out.name!r}"
         )
-    data = tables(runs)
     if ending == ".parquet":
         _check_parquet()
-    if not ending:
-        out.mkdir(parents=True, exist_ok=True)
-        written = _write(data, out / "runs.csv", ".csv")
-        if _has_parquet():
-            written += _write(data, out / "runs.parquet", ".parquet")
-        return written + _write(data, out / "runs.mat", ".mat")
-    out.parent.mkdir(parents=True, exist_ok=True)
-    return _write(data, out, ending)
+    if ending:
+        output_file(out)
+    else:
+        output_folder(out)
+    return ending
 
 
 def _write(data: dict[str, pd.DataFrame], out: Path, ending: str) -> list[Path]:

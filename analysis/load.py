@@ -240,6 +240,32 @@ def find_runs(paths: Iterable[Path]) -> list[Path]:
     return list(dict.fromkeys(runs))
 
 
+def load_runs(paths: Iterable[Path]) -> tuple[list[RunData], list[str]]:
+    """Read the runs among `paths`, and those directly inside them.
+
+    Returns
+    -------
+    runs : list of RunData
+        Those that can be read.
+    left_out : list of str
+        A sentence on each of the others.
+
+    Raises
+    ------
+    StoreError
+        If a path holds no run, or none of the runs can be read.
+    """
+    runs, left_out = [], []
+    for path in find_runs(paths):
+        try:
+            runs.append(load_run(path))
+        except StoreError as error:
+            left_out.append(str(error))
+    if not runs:
+        raise StoreError(left_out[0])
+    return runs, left_out
+
+
 def load_run(path: Path | str) -> RunData:
     """Read a run folder and the centrelines measured from its photographs.
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.files import write_bytes
+from ..core.files import output_file, write_bytes
 
 if TYPE_CHECKING:
     from .design import Design
@@ -40,15 +40,13 @@ def check_path(path: Path) -> Path:
     Raises
     ------
     InputError
-        If its suffix is none that can be drawn, or its folder is missing.
+        If its suffix is none that can be drawn, or it cannot be written.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(
             f"a figure must end in {', '.join(SUFFIXES)}; instead received {path.name}"
         )
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist")
-    return path
+    return output_file(path)
 
 
 def save_figure(figure: Any, path: Path) -> None:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import StoreError
+from ..core.files import output_folder
 from ..core.progress import Progress, silent
 from ..sim import gmc
 from .audit import audit_html, audit_paper
@@ -110,7 +111,7 @@ def reproduce(
     StoreError
         If a run folder is there already.
     """
-    out.mkdir(parents=True, exist_ok=True)
+    output_folder(out)
     paths = [out / f"gmc{number}" for number in NUMBERS]
     for path in paths:
         if path.exists():

@@ -7,7 +7,7 @@ from pathlib import Path
 import typer
 
 from . import design, library, surrogate
-from .console import print_json, progress
+from .console import JSON, print_json, progress
 
 
 def train(
@@ -21,13 +21,16 @@ def train(
     figure: Path | None = typer.Option(
         None, "--figure", help="Plot every seed of every split (.svg, .pdf, .png)."
     ),
-    as_json: bool = typer.Option(False, "--json", help="Print JSON."),
+    as_json: bool = JSON,
 ) -> None:
     """Train the paper's expansion model, and say honestly how far it reaches."""
     from ..analysis import expansion, expansion_train, model_figures
+    from ..core.files import output_file
 
     if figure is not None:
         model_figures.check_path(figure)
+    if out is not None:
+        output_file(out)
     with progress("training") as tell:
         report = expansion_train.train(
             seeds=seeds,
@@ -79,7 +82,7 @@ def predict(
     model: Path | None = typer.Option(
         None, "--model", help="A model of `train --out`; default: the packaged one."
     ),
-    as_json: bool = typer.Option(False, "--json", help="Print JSON."),
+    as_json: bool = JSON,
 ) -> None:
     """Predict a of y = a x^2 with the trained network; warn outside its domain."""
     from ..analysis import expansion

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from ..core.errors import InputError
-from .console import print_json, progress
+from ..core.errors import InputError, MagbendError
+from ..core.progress import silent
+from .console import JSON, print_json, progress
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,7 +23,6 @@ if TYPE_CHECKING:
     from ..sim import Support
 
 _RUNS = typer.Argument(..., help="Run folders, or folders of runs.")
-_JSON = typer.Option(False, "--json", help="Print JSON for a machine.")
 _CLAMP = typer.Option(0.0, "--clamp-angle-deg", help="Direction of the clamp.")
 _GRAVITY = typer.Option(
     None,
@@ -55,12 +56,17 @@ def compare(
     clamp_angle_deg: float = _CLAMP,
     gravity_m_s2: tuple[float, float, float] = _GRAVITY,
     load_factor: float = _LOAD,
-    json: bool = _JSON,
+    json: bool = JSON,
 ) -> None:
     """Compare measured with simulated centrelines; write comparison.csv."""
     from ..analysis.compare import check_any, comparison_table, write_comparison
 
-    done = _compared(runs, model, clamp_angle_deg, gravity_m_s2, load_factor)
+    _choice(model, ("rod", "solid"), "--model")
+    loaded, left_out = _loaded(runs)
+    _outputs(out, *(run.path / "comparison.csv" for run in loaded))
+    done = _compared(
+        loaded, left_out, model, clamp_angle_deg, gravity_m_s2, load_factor
+    )
     for run in done:
         write_comparison(run.run.path / "comparison.csv", [run])
     if out is not None:
@@ -69,7 +75,8 @@ def compare(
     if json:
         print_json(table.to_dict("records"))
     else:
-        _print_comparison(table, done)
+        _print_comparison(table)
+    _tell_left_out(left_out, len(done))
     check_any(done)
 
 
@@ -114,7 +121,7 @@ def fit(
     clamp_angle_deg: float = _CLAMP,
     gravity_m_s2: tuple[float, float, float] = _GRAVITY,
     load_factor: float = _LOAD,
-    json: bool = _JSON,
+    json: bool = JSON,
 ) -> None:
     """Fit the moduli with uncertainties; write fit.json."""
     from ..analysis.fit import fit_runs, write_fit
@@ -123,15 +130,19 @@ def fit(
     from ..analysis.probe import from_probe_reading
     from ..sim import Support
 
-    loaded = _loaded(runs)
+    _choice(field, ("magnet", "uniform"), "--field")
+    nuisance = _nuisance(hold, prior)
+    loaded, left_out = _loaded(runs)
+    path = out or loaded[0].path / "fit.json"
+    _outputs(path)
     if probe_standoff_mm is not None:
         loaded = [from_probe_reading(run, probe_standoff_mm) for run in loaded]
     told = Support() if gravity_m_s2 else common_support(loaded)
     result = fit_runs(
         loaded,
-        model=_choice(field, ("magnet", "uniform"), "--field"),
+        model=field,
         free=free,
-        nuisance=_nuisance(hold, prior),
+        nuisance=nuisance,
         support=_support(told, clamp_angle_deg, gravity_m_s2, load_factor),
         prior_MPa=range_MPa,
         bounds_MPa=bounds_MPa,
@@ -143,7 +154,6 @@ def fit(
             sampled = sample_posterior(
                 result, steps=posterior, seed=seed, progress=tell
             )
-    path = out or loaded[0].path / "fit.json"
     write_fit(path, result, sampled)
     data = result.as_dict()
     if sampled is not None:
@@ -152,6 +162,7 @@ def fit(
         print_json(data)
     else:
         _print_fit(result, path, data.get("posterior"))
+    _tell_left_out(left_out, len(loaded))
 
 
 def report(
@@ -165,7 +176,7 @@ def report(
     clamp_angle_deg: float = _CLAMP,
     gravity_m_s2: tuple[float, float, float] = _GRAVITY,
     load_factor: float = _LOAD,
-    json: bool = _JSON,
+    json: bool = JSON,
 ) -> None:
     """Write one self-contained HTML page, with the figures as PDF beside it."""
     from ..analysis.compare import write_comparison
@@ -173,11 +184,16 @@ def report(
     from ..analysis.report import write_report
     from ..analysis.report.figures import gmc_numbers
 
-    done = _compared(runs, model, clamp_angle_deg, gravity_m_s2, load_factor)
-    fits = [None if no_fit else try_fit(run.run, run.support) for run in done]
+    _choice(model, ("rod", "solid"), "--model")
+    loaded, left_out = _loaded(runs)
     path = out or (
-        done[0].run.path / "report.html" if len(done) == 1 else Path("report.html")
+        loaded[0].path / "report.html" if len(loaded) == 1 else Path("report.html")
     )
+    _outputs(path, *(run.path / "comparison.csv" for run in loaded))
+    done = _compared(
+        loaded, left_out, model, clamp_angle_deg, gravity_m_s2, load_factor
+    )
+    fits = [None if no_fit else try_fit(run.run, run.support) for run in done]
     with progress("report") as tell:
         files = write_report(
             done,
@@ -185,6 +201,7 @@ def report(
             fits=fits,
             title=title,
             by_number=gmc_numbers(done),
+            left_out=left_out,
             progress=tell,
         )
     for run in done:
@@ -197,6 +214,7 @@ def report(
                 "figures": [str(path) for path in files.figures],
                 "runs": len(done),
                 "failed_steps": len(failed),
+                "left_out": left_out,
             }
         )
         return
@@ -205,6 +223,7 @@ def report(
             f"{comparison.run}, step {comparison.step.index}: {comparison.status}",
             err=True,
         )
+    _tell_left_out(left_out, len(done))
     typer.echo(str(files.html))
 
 
@@ -217,11 +236,14 @@ def export(
     ),
 ) -> None:
     """Export points, steps and comparisons as CSV, Parquet or MATLAB .mat."""
-    from ..analysis.export import export_runs
+    from ..analysis.export import check_export, export_runs
 
-    done = _compared(runs, "rod")
+    loaded, left_out = _loaded(runs)
+    check_export(out)
+    done = _compared(loaded, left_out, "rod")
     for path in export_runs(done, out):
         typer.echo(str(path))
+    _tell_left_out(left_out, len(done))
 
 
 def paper(
@@ -230,7 +252,7 @@ def paper(
     workers: int = typer.Option(
         2, "--workers", min=1, help="Benches that run side by side."
     ),
-    json: bool = _JSON,
+    json: bool = JSON,
 ) -> None:
     """Run the paper's seven GMCs at three fields on the twin bench, and report."""
     from ..analysis.paper import reproduce
@@ -246,11 +268,13 @@ def paper(
 
 def audit(
     out: Path = typer.Option(None, "--out", help="Also write the page as HTML."),
-    json: bool = _JSON,
+    json: bool = JSON,
 ) -> None:
     """Check the paper's own numbers; one verdict each, computed here."""
     from ..analysis.audit import audit_paper, write_audit
 
+    if out is not None:
+        _outputs(out)
     findings = audit_paper()
     if out is not None:
         write_audit(out, findings)
@@ -272,7 +296,7 @@ def probe(
         None, "--standoff-mm", help="Stand-off; fitted to the paper's if not given."
     ),
     length_mm: float = typer.Option(30.0, "--length-mm", help="Length of its rod."),
-    json: bool = _JSON,
+    json: bool = JSON,
 ) -> None:
     """Turn readings of a surface probe into remanences, by the stand-off."""
     from ..analysis.probe import fit_standoff, read_probe_csv, remanence_from_probe_mT
@@ -299,40 +323,58 @@ def probe(
         typer.echo(line)
 
 
-def _loaded(paths: Sequence[Path]) -> list[RunData]:
-    from ..analysis.load import find_runs, load_run
+def _loaded(paths: Sequence[Path]) -> tuple[list[RunData], list[str]]:
+    """Return the runs that can be read, and a sentence on each that cannot."""
+    from ..analysis.load import load_runs
 
-    loaded = [load_run(path) for path in find_runs(paths)]
+    loaded, left_out = load_runs(paths)
     for run in loaded:
         for warning in run.warnings:
             typer.echo(f"{run.label}: {warning}", err=True)
-    return loaded
+    return loaded, left_out
 
 
 def _compared(
-    paths: Sequence[Path],
+    loaded: Sequence[RunData],
+    left_out: list[str],
     model: str,
     clamp_angle_deg: float = 0.0,
     gravity_m_s2: tuple[float, float, float] | None = None,
     load_factor: float = 1.0,
 ) -> list[RunComparison]:
+    """Compare each run; add a sentence to `left_out` on each that cannot be."""
     from ..analysis.compare import compare_run
 
-    _choice(model, ("rod", "solid"), "--model")
-    loaded = _loaded(paths)
-
-    def compared(run: RunData) -> RunComparison:
-        support = _support(run.support, clamp_angle_deg, gravity_m_s2, load_factor)
-        return compare_run(run, support=support, model=model)
-
-    if len(loaded) < 5:
-        return [compared(run) for run in loaded]
-    done = []
-    with progress("compare") as tell:
-        for run in loaded:
-            done.append(compared(run))
-            tell(len(done), len(loaded))
+    done, errors = [], []
+    with progress("compare") if len(loaded) > 4 else nullcontext(silent) as tell:
+        for number, run in enumerate(loaded, start=1):
+            support = _support(run.support, clamp_angle_deg, gravity_m_s2, load_factor)
+            try:
+                done.append(compare_run(run, support=support, model=model))
+            except MagbendError as error:
+                errors.append(error)
+                left_out.append(f"{run.path}: {error}")
+            tell(number, len(loaded))
+    if not done:
+        raise errors[0]
     return done
+
+
+def _tell_left_out(left_out: Sequence[str], kept: int) -> None:
+    for sentence in left_out:
+        typer.echo(f"left out: {sentence}", err=True)
+    if left_out:
+        runs = len(left_out) + kept
+        typer.echo(f"{len(left_out)} of {runs} runs left out", err=True)
+
+
+def _outputs(*paths: Path | None) -> None:
+    """Refuse what cannot be written, before the work."""
+    from ..core.files import output_file
+
+    for path in paths:
+        if path is not None:
+            output_file(path)
 
 
 def _support(
@@ -386,7 +428,7 @@ def _nuisance(hold: Sequence[str], prior: Sequence[str]) -> Any:
     return replace(Nuisance(), **values)
 
 
-def _print_comparison(table: pd.DataFrame, done: Sequence[RunComparison]) -> None:
+def _print_comparison(table: pd.DataFrame) -> None:
     from rich import box
     from rich.console import Console
     from rich.table import Table

@@ -13,6 +13,9 @@ import typer
 
 from ..core.progress import Progress
 
+JSON = typer.Option(False, "--json", help="Print JSON for a machine.")
+"""The option of every command whose result a machine may read."""
+
 
 def group(name: str, help_text: str, example: str) -> typer.Typer:
     """Return a command group with plain, fast help."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from .console import print_json
+from .console import JSON, print_json
 
 if TYPE_CHECKING:
     from ..analysis.design import Design
@@ -75,11 +75,12 @@ def design(
     out: Path | None = typer.Option(
         None, "--out", help="Folder for the specimen files design_1.json, ..."
     ),
-    as_json: bool = typer.Option(False, "--json", help="Print JSON."),
+    as_json: bool = JSON,
 ) -> None:
     """Find distinct rods that give a wanted shape, ranked by error and tolerance."""
     from ..analysis import design as designing
     from ..analysis import model_figures
+    from ..core.files import output_folder
 
     if figure is not None:
         model_figures.check_path(figure)
@@ -95,6 +96,8 @@ def design(
         "remanence_mT": remanence_mT,
     }
     limits = _makeable(makeable, options, recipes, goal)
+    if out is not None:
+        output_folder(out)
     found = designing.design(goal, field, limits, count=count, seed=seed)
     if figure is not None:
         drawing = model_figures.design_figure(found, goal)
@@ -215,7 +218,6 @@ def _write(found: list[Design], out: Path) -> None:
     from ..core.files import write_text
     from ..core.specimen_file import specimen_dict
 
-    out.mkdir(parents=True, exist_ok=True)
     for number, one in enumerate(found, start=1):
         text = json.dumps(specimen_dict(one.specimen), indent=2) + "\n"
         write_text(out / f"design_{number}.json", text)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from .console import group, print_json, progress
+from .console import JSON, group, print_json, progress
 
 app = group(
     "library",
@@ -32,7 +32,7 @@ def build(
         "--scheduler",
         help="Dask scheduler, such as tcp://host:8786; workers must see --out.",
     ),
-    as_json: bool = typer.Option(False, "--json", help="Print JSON."),
+    as_json: bool = JSON,
 ) -> None:
     """Solve a design space into Parquet; go on where an earlier build stopped."""
     from dataclasses import asdict
@@ -66,13 +66,16 @@ def query(
     ),
     top: int = typer.Option(20, "--top", help="How many rows."),
     out: Path | None = typer.Option(None, "--out", help=".csv or .parquet."),
-    as_json: bool = typer.Option(False, "--json", help="Print JSON."),
+    as_json: bool = JSON,
 ) -> None:
     """Search a library: conditions, nearest shape, sort, the best few."""
     from ..analysis.library import query as searching
     from ..core.centreline import Centreline
+    from ..core.files import output_file
 
     shape = None if nearest is None else Centreline.from_csv(nearest)
+    if out is not None:
+        output_file(out)
     found = searching.query(
         library, where=where, ranges=ranges, nearest=shape, sort=sort, top=top
     )

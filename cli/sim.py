@@ -70,6 +70,7 @@ def shape(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Predict the shape of a rod in a uniform field or before a magnet."""
+    from ..core.files import output_file
     from ..core.jit import once
     from ..sim.fields import Support
     from ..sim.solve import solve
@@ -81,6 +82,8 @@ def shape(
         gravity_m_s2=gravity_m_s2,
         load_factor=load_factor,
     )
+    if out is not None:
+        output_file(out)
     solution = once(
         lambda: solve(
             rod,

@@ -46,6 +46,7 @@ def equilibria(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Find every planar equilibrium of a weightless rod, stable or not."""
+    from ..core.files import output_file
     from ..core.jit import once
     from ..sim.equilibria import find_equilibria
     from ..sim.equilibria_folds import trace_branches
@@ -54,6 +55,8 @@ def equilibria(
     rod = _specimen(gmc, specimen, remeasured)
     field = UniformField(flux_mT=field_mT, angle_deg=angle_deg)
     support = Support(clamp_angle_deg=clamp_angle_deg, load_factor=load_factor)
+    if figure is not None:
+        output_file(figure)
     found = once(lambda: find_equilibria(rod, field, support=support))
     branches: tuple[Branch, ...] = ()
     if fold or figure is not None:

@@ -67,8 +67,10 @@ def magnet(
         tolerance_percent=tolerance_percent,
     )
     if field_map is not None:
+        from ..core.files import output_file
         from ..sim.figures import draw_field_map
 
+        output_file(field_map)
         draw_field_map(field_map, sides_mm=sides, remanence_T=fit.remanence_T)
     if as_json:
         print_json(_plain(fit) | ({"paper": printed} if printed else {}))

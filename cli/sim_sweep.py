@@ -44,7 +44,7 @@ def sweep(
         raise typer.BadParameter(f"{unknown[0]!r} is none of {', '.join(NAMES)}")
     if values is not None and len(names) != 1:
         raise typer.BadParameter("--values belongs to one study: name it")
-    from ..core.files import write_text
+    from ..core.files import output_folder, write_text
     from ..sim.fields import UniformField
     from ..sim.figures import draw_study
     from ..sim.sweep import STUDIES, sweep_csv
@@ -61,12 +61,12 @@ def sweep(
         names.remove("length")  # its default values are for three sections
     field = UniformField(flux_mT=field_mT, angle_deg=angle_deg)
     chosen = [value.strip() for value in values.split(",")] if values else []
+    output_folder(out)
     solved = {}
     with progress("sweep") as tell:
         for done, name in enumerate(names, start=1):
             solved[name] = solve_study(name, rod, field, values=chosen, model=model)
             tell(done, len(names))
-    out.mkdir(parents=True, exist_ok=True)
     title = f"{rod.name}, {field_mT:g} mT at {angle_deg:g} deg"
     rows = []
     for name, shapes in solved.items():

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from .console import group, print_json, progress
+from .console import JSON, group, print_json, progress
 
 app = group(
     "surrogate",
@@ -30,12 +30,13 @@ def predict(
         None, "--correction", help="A file of `surrogate correct`."
     ),
     out: Path | None = typer.Option(None, "--out", help="Write the shape (CSV)."),
-    as_json: bool = typer.Option(False, "--json", help="Print JSON."),
+    as_json: bool = JSON,
 ) -> None:
     """Predict a shape with its error bar; refuse outside the trust region."""
     from ..analysis import surrogate, surrogate_tables
     from ..core.centreline import Centreline
     from ..core.errors import InputError
+    from ..core.files import output_file
     from ..core.specimen_file import read_specimen
     from ..sim import gmc as table_1
     from ..sim.batch_shapes import designs_of
@@ -46,6 +47,8 @@ def predict(
         rod = read_specimen(specimen)
     else:
         rod = table_1(gmc or 1)
+    if out is not None:
+        output_file(out)
     designs = designs_of(rod, flux_mT)
     if correction is not None:
         learnt = surrogate_tables.load_correction(correction)
@@ -87,7 +90,9 @@ def fit(
 ) -> None:
     """Fit the surrogate to solved shapes over its domain."""
     from ..analysis import surrogate, surrogate_fit
+    from ..core.files import output_file
 
+    output_file(out)
     with progress("fitting") as tell:
         model = surrogate_fit.fit(degree=degree or surrogate_fit.DEGREE, progress=tell)
     surrogate.save(model, out)
@@ -107,12 +112,14 @@ def fit(
 def correct(
     tables: list[Path] = typer.Argument(..., help="Text exports with % header lines."),
     out: Path = typer.Option(..., "--out", help="Correction file (.json)."),
-    as_json: bool = typer.Option(False, "--json", help="Print JSON."),
+    as_json: bool = JSON,
 ) -> None:
     """Learn from finite-element or COMSOL tables what the rod misses."""
     from ..analysis import surrogate_tables
+    from ..core.files import output_file
 
     cases = surrogate_tables.read_tables(tables)
+    output_file(out)
     learnt = surrogate_tables.fit_correction(cases)
     surrogate_tables.save_correction(learnt, out)
     if as_json:
@@ -135,7 +142,7 @@ def correct(
 @app.command(epilog="Example: magbend analysis surrogate compare")
 def compare(
     designs: int = typer.Option(2000, "--designs", min=64, help="Unseen designs."),
-    as_json: bool = typer.Option(False, "--json", help="Print JSON."),
+    as_json: bool = JSON,
 ) -> None:
     """Print one honest table: solver, network, linear formula, surrogate."""
     from dataclasses import asdict
@@ -163,14 +170,16 @@ def sensitivity(
         None, "--figure", help="Draw the indices (.svg, .pdf, .png)."
     ),
     out: Path | None = typer.Option(None, "--out", help="Write the table (CSV)."),
-    as_json: bool = typer.Option(False, "--json", help="Print JSON."),
+    as_json: bool = JSON,
 ) -> None:
     """Say which parameter matters where: Sobol indices over the design domain."""
     from ..analysis import model_figures, sobol
-    from ..core.files import write_text
+    from ..core.files import output_file, write_text
 
     if figure is not None:
         model_figures.check_path(figure)
+    if out is not None:
+        output_file(out)
     with progress("fields") as tell:
         found = sobol.sensitivity(
             fields_mT=fields_mT, samples=samples, seed=seed, progress=tell

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from ..core.errors import InputError
-from .console import group, print_json, progress
+from .console import JSON, group, print_json, progress
 
 if TYPE_CHECKING:
     from ..vision.batch import Settings
@@ -39,10 +39,12 @@ def board(
     dpi: int = typer.Option(600, "--dpi", help="Resolution of a .png."),
 ) -> None:
     """Write the ChArUco board to print."""
+    from ..core.files import output_file
     from ..vision.board import Board
     from ..vision.board_print import write_board
 
     columns, rows = _two_numbers(squares, "--board")
+    output_file(out)
     design = Board(
         columns=columns,
         rows=rows,
@@ -50,7 +52,6 @@ def board(
         marker_mm=marker_mm,
         dictionary=dictionary,
     )
-    out.parent.mkdir(parents=True, exist_ok=True)
     write_board(design, out, dpi=dpi)
     width, height = design.size_mm
     typer.echo(
@@ -98,12 +99,14 @@ def calibrate(
     scale_mm_per_px: float = typer.Option(
         None, "--scale-mm-per-px", help="No board: the scale itself."
     ),
-    json_output: bool = typer.Option(False, "--json", help="Print JSON."),
+    json_output: bool = JSON,
 ) -> None:  # fmt: skip
     """Calibrate a camera from photographs of the board."""
+    from ..core.files import output_file
     from ..vision.calibrate import calibrate as calibrate_photos
     from ..vision.photo import read_photo
 
+    output_file(out)
     if known_length or scale_mm_per_px is not None:
         if known_length and scale_mm_per_px is not None:
             raise typer.BadParameter("give --known-length or --scale-mm-per-px")
@@ -126,7 +129,6 @@ def calibrate(
             camera_height_mm=camera_height_mm,
             focal_px=focal_px,
         )
-    out.parent.mkdir(parents=True, exist_ok=True)
     result.save(out)
     facts = _calibration_facts(result)
     if json_output:
@@ -190,9 +192,10 @@ def extract(
     resume: bool = typer.Option(
         False, "--resume", help="Keep what is measured already, with these settings."
     ),
-    json_output: bool = typer.Option(False, "--json", help="Print JSON."),
+    json_output: bool = JSON,
 ) -> None:  # fmt: skip
     """Measure the rod's centreline in photographs."""
+    from ..core.files import output_file, output_folder
     from ..vision.batch import extract_files
     from ..vision.figures import figure_kind
     from ..vision.inputs import list_sources
@@ -217,6 +220,10 @@ def extract(
         joints_mm=_numbers(joints_mm),
         clamp="none" if free else "auto",
     )
+    for path in (edges, figure_steps):
+        if path is not None:
+            output_file(path)
+    output_folder(folder)
     with progress("photographs") as report:
         result = extract_files(
             images,
@@ -233,7 +240,6 @@ def extract(
         from ..vision.inputs import read_source
 
         index = next(i for i, frame in enumerate(result.frames) if frame.ok)
-        figure_steps.parent.mkdir(parents=True, exist_ok=True)
         figure_of_steps(read_source(sources[index]), settings, figure_steps)
     _tell_frames(result, json_output=json_output)
 

@@ -10,6 +10,49 @@ from pathlib import Path
 from .errors import InputError
 
 
+def output_file(path: Path) -> Path:
+    """Return `path` once a file can be written there; call it before the work.
+
+    Folders that are missing on the way are made.
+
+    Raises
+    ------
+    InputError
+        If `path` names a folder or nothing, or `output_folder` refuses its folder.
+    """
+    _check_name(path)
+    if not path.exists() or path.is_file():
+        output_folder(path.parent)
+    return path
+
+
+def output_folder(folder: Path) -> Path:
+    """Return `folder` once files can be written in it; call it before the work.
+
+    It is made where it is missing, with the folders on the way.
+
+    Raises
+    ------
+    InputError
+        If a file stands where a folder belongs, or nothing may be written there.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise InputError(
+            f"{folder}: a file stands where a folder belongs; give another name"
+        ) from None
+    except PermissionError:
+        raise InputError(
+            f"{folder}: this folder may not be made; give another place"
+        ) from None
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(
+            f"{folder}: nothing may be written in this folder; give another place"
+        )
+    return folder
+
+
 def write_bytes(path: Path, data: bytes) -> None:
     """Write `data` so that `path` holds the old content or all of the new.
 
@@ -25,10 +68,7 @@ def write_bytes(path: Path, data: bytes) -> None:
         If the folder is missing, read-only or full; it names `path`, and no temporary
         file is left.
     """
-    if not path.name or path.is_dir():
-        raise InputError(
-            f"the output file must have a name; instead received the folder {path}"
-        )
+    _check_name(path)
     if path.exists() and not path.is_file():
         path.write_bytes(data)
         return
@@ -48,6 +88,13 @@ def write_bytes(path: Path, data: bytes) -> None:
                 error.strerror = f"there is no folder {path.parent}; make it first"
         raise
     sync_folder(path.parent)
+
+
+def _check_name(path: Path) -> None:
+    if not path.name or path.is_dir():
+        raise InputError(
+            f"the output file must have a name; instead received the folder {path}"
+        )
 
 
 def write_text(path: Path, text: str) -> None:

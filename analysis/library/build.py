@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import MissingExtraError, StoreError
-from ...core.files import write_bytes, write_text
+from ...core.files import output_folder, write_bytes, write_text
 from ...core.progress import Progress, silent
 from ...sim.batch_shapes import ROWS_PER_CALL, STATUS, Designs, cores, solve_shapes
 from .. import descriptors
@@ -274,7 +274,7 @@ def _claim(space: Space, out: Path) -> None:
         return
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise StoreError(f"{out}: exists and is no library; give a new --out folder")
-    out.mkdir(parents=True, exist_ok=True)
+    output_folder(out)
     write_text(out / MANIFEST, json.dumps(manifest, indent=2) + "\n")
 
 

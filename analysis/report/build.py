@@ -69,6 +69,7 @@ def write_report(
     title: str = "",
     by_number: dict[int, RunComparison] | None = None,
     extra_html: Sequence[tuple[str, str]] = (),
+    left_out: Sequence[str] = (),
     progress: Progress = silent,
 ) -> ReportFiles:
     """Write the report of one or several runs.
@@ -87,6 +88,8 @@ def write_report(
         The runs of GMC 1 to 7, for the paper's comparison figure.
     extra_html : sequence of (heading, html), optional
         Sections before the provenance; the HTML is taken as it is.
+    left_out : sequence of str
+        Runs that could not be read or compared, a sentence each.
     progress : callable
         Told after every run.
 
@@ -112,6 +115,7 @@ def write_report(
         summary=_summary(runs, drawing) if len(runs) > 1 else None,
         paper=_paper(by_number, drawing),
         extra=extra_html,
+        left_out=left_out,
         made_utc=datetime.now(UTC).isoformat(timespec="seconds"),
         version=_version(),
     )

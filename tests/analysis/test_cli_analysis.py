@@ -68,6 +68,61 @@ def test_compare_stops_where_nothing_can_be_compared(
     assert "Traceback" not in err
 
 
+@pytest.mark.parametrize("command", ["compare", "report", "fit", "export"])
+def test_a_bad_run_among_good_ones_is_named_and_left_out(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    command: str,
+) -> None:
+    folder = tmp_path / "runs"
+    for name in ("a", "b", "c"):
+        write_run(folder / name, sigma_mm=0.005)
+    (folder / "b" / "frames.csv").unlink()
+    out = tmp_path / "out.html" if command == "report" else tmp_path / "out.csv"
+    code, _, err = call(capsys, monkeypatch, command, folder, "--out", out)
+    assert code == 0
+    assert f"left out: {folder / 'b'}: frames.csv is missing" in err
+    assert "1 of 3 runs left out" in err
+    if command == "compare":
+        assert set(pd.read_csv(out)["run"]) == {"a", "c"}
+    if command == "report":
+        page = out.read_text()
+        assert "1 of 3 runs could not be read or compared" in page
+        assert "frames.csv is missing" in page
+    for name in ("a", "c"):
+        (folder / name / "frames.csv").unlink()
+    code, _, err = call(capsys, monkeypatch, command, folder, "--out", out)
+    assert code == 1
+
+
+@pytest.mark.parametrize("command", ["compare", "fit", "report", "export"])
+def test_out_is_refused_before_the_work_and_its_folders_are_made(
+    run: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    command: str,
+) -> None:
+    (tmp_path / "file").write_text("")
+    bad = tmp_path / "file" / "out.csv"
+    with monkeypatch.context() as patch:
+        for work in ("compare.compare_run", "fit.fit_runs"):
+            patch.setattr(f"magbend.analysis.{work}", _must_not_be_called)
+        code, _, err = call(capsys, patch, command, run, "--out", bad)
+    assert code == 1
+    assert "a file stands where a folder belongs" in err
+    assert not (run / "comparison.csv").exists()
+    good = tmp_path / "new" / "deep" / "out.csv"
+    code, _, err = call(capsys, monkeypatch, command, run, "--out", good)
+    assert code == 0, err
+    assert any(good.parent.iterdir())
+
+
+def _must_not_be_called(*_: object, **__: object) -> None:
+    raise AssertionError("the work began before --out was checked")
+
+
 def test_fit(
     run: Path,
     capsys: pytest.CaptureFixture[str],

@@ -232,6 +232,39 @@ def test_browser_shows_it_without_errors(
     assert "ERR_" not in log.stderr
 
 
+@pytest.mark.browser
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium on the PATH")
+def test_a_click_on_a_head_sorts_the_table_and_a_second_one_turns_it(
+    tmp_path: Path,
+) -> None:
+    runs = [compared(tmp_path / f"gmc{k}", specimen=sim.gmc(k)) for k in (2, 4, 5)]
+    out = tmp_path / "report.html"
+    write_report(runs, out)
+    page = out.read_text(encoding="utf-8")
+    for clicks, rule in ((1, "ascending"), (2, "descending")):
+        # What a reader does, done to a copy of the page by a script at its end.
+        script = f"""<script>
+            const table = document.querySelector("table.sortable");
+            const head = [...table.tHead.rows[0].cells].find(
+                (cell) => cell.textContent.includes("RMS"));
+            for (let k = 0; k < {clicks}; k++) head.click();
+            const values = [...table.tBodies[0].rows].map(
+                (row) => row.cells[head.cellIndex].textContent.trim());
+            document.title = "sorted " + head.ariaSort + ": " + values.join(" ");
+        </script></body>"""
+        copy = tmp_path / "clicked.html"
+        copy.write_text(page.replace("</body>", script), encoding="utf-8")
+        log = browser(tmp_path, copy, "--dump-dom")
+        assert "Uncaught" not in log.stderr, log.stderr
+        found = re.search(r"<title>sorted (\w+): ([^<]*)</title>", log.stdout)
+        assert found is not None, log.stdout[:500]
+        values = [float(text) for text in found[2].split()]
+        assert found[1] == rule
+        assert len(values) == 18
+        assert len(set(values)) > 9
+        assert values == sorted(values, reverse=rule == "descending")
+
+
 def browser(
     tmp_path: Path, page: Path, *flags: str
 ) -> subprocess.CompletedProcess[str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from magbend.core.errors import ConfigError, InputError
-from magbend.core.files import write_bytes
+from magbend.core.files import output_file, output_folder, write_bytes
 from magbend.core.specimen_file import (
     read_magnet,
     read_specimen,
@@ -152,3 +152,29 @@ def test_a_place_that_cannot_be_written_is_named_as_the_user_named_it(
     with pytest.raises(InputError, match="must have a name"):
         write_bytes(Path(), b"new")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_output_is_checked_before_the_work_and_its_folders_made(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "new" / "deep" / "shape.csv"
+    assert output_file(path) == path
+    assert path.parent.is_dir()
+    assert not path.exists()
+    path.write_text("a file")
+    with pytest.raises(InputError, match="a file stands where a folder belongs"):
+        output_file(path / "below.csv")
+    with pytest.raises(InputError, match="a file stands where a folder belongs"):
+        output_folder(path)
+    with pytest.raises(InputError, match="must have a name"):
+        output_file(path.parent)
+    output_file(Path(os.devnull))
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The superuser may write anywhere, so the system's answer is stood in for.
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with pytest.raises(InputError, match="nothing may be written in this folder"):
+        output_file(tmp_path / "shape.csv")

@@ -196,3 +196,15 @@ def test_shape_loads_little() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
     assert done.stdout.splitlines()[-1] == "[]"
+
+
+def test_sweep_refuses_its_folder_before_it_solves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def began(*_: object, **__: object) -> None:
+        raise AssertionError("the work began before --out was checked")
+
+    monkeypatch.setattr("magbend.sim.sweep.sweep", began)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="a file stands where a folder belongs"):
+        run("sweep", "field", "--out", str(tmp_path / "file"))
