@@ -230,25 +230,37 @@ def _check_gaps(
 ) -> None:
     line = line_of(text, ("gaps_mm",))
     where = f"{path}, line {line}" if line else f"{path}"
-    low_mm = rig.limits.min_gap_mm
-    high_mm = rig.limits.max_gap_mm
+    before = math.inf
     for index, gap_mm in enumerate(model.gaps_mm):
-        if gap_mm < low_mm:
-            raise ConfigError(
-                f"{where}: gaps_mm[{index}] = {gap_mm:g} mm is under the interlock of "
-                f"{low_mm:g} mm ({rig_path.name}, limits.min_gap_mm)"
-            )
-        if gap_mm > high_mm:
-            raise ConfigError(
-                f"{where}: gaps_mm[{index}] = {gap_mm:g} mm is beyond the largest gap "
-                f"of {high_mm:g} mm ({rig_path.name}, limits.max_gap_mm)"
-            )
-    for index, (before, after) in enumerate(
-        zip(model.gaps_mm, model.gaps_mm[1:], strict=False), start=1
-    ):
-        if after >= before:
+        named = f"gaps_mm[{index}] = {gap_mm:g} mm"
+        found = _why_not_there(gap_mm, rig)
+        if found:
+            reason, keys = found
+            raise ConfigError(f"{where}: {named} {reason} ({rig_path.name}, {keys})")
+        if gap_mm >= before:
             raise ConfigError(
                 f"{where}: gaps_mm must fall, so that the magnet is approached from "
-                f"the far side only; instead gaps_mm[{index}] = {after:g} mm follows "
-                f"{before:g} mm"
+                f"the far side only; instead {named} follows {before:g} mm"
             )
+        before = gap_mm
+
+
+def _why_not_there(gap_mm: float, rig: RigModel) -> tuple[str, str] | None:
+    """Return why a gap is out of bounds, and the keys that say so."""
+    stage, limits = rig.stage, rig.limits
+    if gap_mm < limits.min_gap_mm:
+        low = f"{limits.min_gap_mm:g} mm"
+        return f"is under the interlock of {low}", "limits.min_gap_mm"
+    if gap_mm > limits.max_gap_mm:
+        high = f"{limits.max_gap_mm:g} mm"
+        return f"is beyond the largest gap of {high}", "limits.max_gap_mm"
+    # Boards count from a switch, into the negative or into the positive.
+    machine_mm = abs(gap_mm - stage.gap_at_zero_mm)
+    has_switches = stage.homing == "switches"
+    if has_switches and stage.travel_mm is not None and machine_mm > stage.travel_mm:
+        return (
+            f"lies {machine_mm:g} mm from the machine's zero, beyond its travel of "
+            f"{stage.travel_mm:g} mm",
+            "stage.travel_mm, gap_at_zero_mm",
+        )
+    return None

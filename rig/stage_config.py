@@ -43,8 +43,20 @@ class StageConfig(FileModel):
 
     @model_validator(mode="after")
     def _home_command_is_a_homing(self) -> StageConfig:
-        if self.driver == "grbl" and not self.home_command.startswith("$H"):
-            raise ValueError("home_command must be '$H', '$HX', '$HY' or '$HZ'")
+        allowed = ("$H", f"$H{self.axis}")
+        if self.driver == "grbl" and self.home_command not in allowed:
+            raise ValueError(
+                f"home_command must be '$H' (all axes) or '$H{self.axis}' (stage.axis "
+                f"alone); instead received {self.home_command!r}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _settings_are_of_the_driver(self) -> StageConfig:
+        if self.driver == "marlin" and self.settings:
+            raise ValueError(
+                "[stage.settings] lists the $ numbers of GRBL; a Marlin board has none"
+            )
         return self
 
 

@@ -84,6 +84,13 @@ def test_a_wrong_plan_is_one_sentence(plan_file, old, new, sentence) -> None:
         ("side_mm = 55.0\n", "", "either side_mm"),
         ("[limits]", "[limit]", "unknown key 'limit'; did you mean 'limits'"),
         ('driver = "twin"', 'driver = "twin"\nsign = 2', "meter.sign"),
+        ('port = "none"', 'home_command = "$HY"', r"'\$H' .* or '\$HX'"),
+        ('port = "none"', 'home_command = "$HELP"', "home_command must be"),
+        (
+            'port = "none"',
+            'driver = "marlin"\nsettings = { "$22" = 1 }',
+            "a Marlin board has none",
+        ),
     ],
 )
 def test_a_wrong_rig_is_one_sentence(plan_file, old, new, sentence) -> None:
@@ -103,6 +110,13 @@ def test_the_dry_run_adds_up(plan_file: Path) -> None:
     # 10 mm at 5 mm/s, half a second to speed up and down, then the fixed times.
     assert steps[1].time_s > 2.5 + plan.settle.time_s
     assert homing_s(plan) > 0.0
+
+
+def test_a_plan_beyond_the_travel_is_refused_before_any_device(plan_file) -> None:
+    rig = plan_file.with_name("rig.toml")
+    rig.write_text(RIG.replace('port = "none"', "travel_mm = 95.0"))
+    with pytest.raises(ConfigError, match=r"gaps_mm\[2\] = 50 mm lies 100 mm from"):
+        read_plan(plan_file)
 
 
 HEAVY = SPECIMEN.replace("side_mm = 1.0", "side_mm = 1.0\ndensity_kg_m3 = 2640.0")
