@@ -11,9 +11,12 @@ when its load grows from zero:
   load, it is stable, and as gamma at the clamp crosses T once, a bracketed Newton on
   the tip angle alone finds it at any load. tan(gamma / 4) at the clamp is nearly
   proportional to its value at the tip, so the iteration runs on these.
-* Otherwise Newton on (gamma, x_L, y_L) from the straight rod; where its corrections do
-  not shrink to a quarter from step to step, load continuation with tangent predictors.
-  The load at which no smaller step helps is a fold: beyond it the rod is pulled in.
+* Otherwise Newton on (gamma, x_L, y_L) from the straight rod, where that finds the
+  branch from zero load: if the straight rod under full load has no unstable direction
+  (then it has none under any smaller load, since its stiffness is linear in the load),
+  and if the corrections shrink to a quarter from step to step, as the theorem of
+  Kantorovich asks for. Else load continuation with tangent predictors. The load at
+  which no smaller step helps is a fold: beyond it the rod is pulled in.
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ from numpy.typing import NDArray
 
 from ..core.jit import njit
 from .magnet_field import inside
+from .planar_contact import in_reach, touches
 from .planar_march import MAX_ORDER, PART, STATE, WX, WY, E, H, M, march
 
 Array = NDArray[np.float64]
@@ -45,13 +49,15 @@ MAX_TRIALS = 400
 ORDER = 16
 STEP = 0.3
 ROUNDING = 2e-14
-"""What rounding alone may leave, in lengths of the rod."""
+"""What rounding may leave of a residual, in lengths of the rod."""
 
 COARSE_ORDER = 8
 COARSE_STEP = 0.6
 """What brings an iteration within about 1e-7 of its end, at a quarter of the cost."""
 
+FIRST = 0.6
 SHRINK = 0.25
+"""Largest first correction from the straight rod, and how each must shrink."""
 SMALL = 1e-7
 """Correction after which the next would be of the size of rounding."""
 NEAR = 1e-3
@@ -107,24 +113,6 @@ def straight(clamp, u):  # type: ignore[no-untyped-def]
     u[0] = clamp - u[3]
     u[1] = math.cos(clamp)
     u[2] = math.sin(clamp)
-
-
-@njit(**PART)
-def _in_reach(field, margin):  # type: ignore[no-untyped-def]
-    """Tell whether a rod clamped at the origin is long enough to touch the magnet."""
-    if field[0] == 0.0:
-        return False
-    corner = math.sqrt(field[1] ** 2 + field[2] ** 2 + field[3] ** 2)
-    return math.hypot(field[4], field[5]) <= 1.0 + margin + corner
-
-
-@njit(**PART)
-def _touches(field, margin, curve):  # type: ignore[no-untyped-def]
-    """Tell whether any point of a curve is within `margin` of the magnet."""
-    found = False
-    for k in range(curve.shape[1]):
-        found = found or inside(field[1:], curve[0, k], curve[1, k], 0.0, margin)
-    return found
 
 
 @njit(cache=True, error_model="numpy")
@@ -310,30 +298,44 @@ def _correct(columns, clamp, u, X, D, d):  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
+def _rounding(reach, columns, D, d):  # type: ignore[no-untyped-def]
+    """Return what rounding may do: more for long rods and near singular matrices."""
+    if columns == 1:
+        return ROUNDING * (1.0 + reach) * (1.0 + 1.0 / abs(D[0, 0]))
+    total = 1.0
+    for i in range(3):
+        solve3(D, 1.0 * (i == 0), 1.0 * (i == 1), 1.0 * (i == 2), d)
+        total += abs(d[0]) + abs(d[1]) + abs(d[2])
+    return ROUNDING * (1.0 + reach) * total
+
+
+@njit(**PART)
 def _solve_row(  # type: ignore[no-untyped-def]
     rod, field, clamp, margin, s, order, step, cold, u, found, out, X, D, T, C, d
 ):
     """Solve one rod into `found` and `out` (see `solve_rows`)."""
     bracket = np.empty(5)
-    reach = _in_reach(field, margin)
+    near = in_reach(field, margin)
     if cold:
         u[3] = 0.0
         straight(clamp, u)
-        if reach:
+        if near:
             for k in range(s.shape[0]):
                 out[0, k] = s[k] * u[1]
                 out[1, k] = s[k] * u[2]
-            if _touches(field, margin, out):
+                out[2, k] = clamp
+            if touches(field, margin, s, out):
                 found[0] = TOUCHES
                 return
     simple = one_sided(rod, field)
     limit = _first_guess(rod, field, clamp, u, bracket) if simple else math.inf
     columns = 1 if simple else 4
     stage = COARSE if cold and order > COARSE_ORDER else FINE
-    first = 1.0 if cold else 0.1
+    first = FIRST if cold else 0.1
     before = math.inf
     error = -1.0
     index = 0
+    x = y = 0.0
     for k in range(220):
         free = field[0] == 0.0 or stage == SHAPE
         if not free and inside(field[1:], u[1], u[2], 0.0, 0.0):
@@ -353,9 +355,15 @@ def _solve_row(  # type: ignore[no-untyped-def]
             if not _reach(rod, math.hypot(X[9], X[10])) < most:
                 found[0] = TOO_STRONG
                 return
+            if zeros > 0 and not simple:
+                break
         if simple and stage != SHAPE:
             enough = NEAR if stage == COARSE else SMALL
+            ahead = -u[0]
             done = limit > 4.0 or _narrow(zeros < 0, enough, X, D, u, bracket)
+            ahead += u[0]
+            x = X[2] + ahead * D[2, 0]
+            y = X[3] + ahead * D[3, 0]
             if done and stage == COARSE:
                 bracket[0] = 0.0
                 bracket[1] = bracket[3]
@@ -366,6 +374,8 @@ def _solve_row(  # type: ignore[no-untyped-def]
                 done = error >= 0.0
                 if not done:
                     error = size + abs(d[0]) + abs(d[1]) + abs(d[2])
+                    if simple:  # whose residual is the angle's alone
+                        error += abs(X[2] - x) + abs(X[3] - y)
                     done = error < ENOUGH
                 if done:
                     break
@@ -388,10 +398,10 @@ def _solve_row(  # type: ignore[no-untyped-def]
     found[0] = OK_STABLE if index == 0 else OK_UNSTABLE
     if not _place(u, X, out):
         found[0] = FAILED
-    elif reach and _touches(field, margin, out):
+    elif near and touches(field, margin, s, out):
         found[0] = GONE
     found[1] = index
-    found[2] = error + ROUNDING
+    found[2] = error + _rounding(_reach(rod, math.hypot(X[9], X[10])), columns, D, d)
     found[3] = X[9]
     found[4] = X[10]
     found[5] = -X[1]
@@ -516,6 +526,35 @@ def _solve_by_following(
         found[0, 6] = load
 
 
+def _load_before_touching(
+    end: float,
+    rod: Array,
+    fields: Array,
+    clamp: float,
+    margins: Array,
+    s: Array,
+    order: int,
+    step: float,
+) -> float:
+    """Return up to which load a rod, whose branch ends at `end`, touches no magnet."""
+    low, high = 0.0, end
+    load = end * (1.0 - 1e-6)
+    for _ in range(20):
+        part = rod.copy()
+        part[:, M:] *= load
+        found, _, _ = solve_planar_rows(
+            part[None], fields, clamp, margins, s, order, step
+        )
+        if found[0, 0] > OK_UNSTABLE:
+            high = load
+        elif high == end:
+            return end
+        else:
+            low = load
+        load = 0.5 * (low + high)
+    return low
+
+
 def solve_planar(
     rod: Array,
     field: Array,
@@ -542,5 +581,7 @@ def solve_planar(
     solve_rows(*case, True, u, found, out)
     if found[0, 0] == FOLLOW:
         _solve_by_following(*case, u, found, out)
+    if found[0, 0] == GONE:
+        found[0, 6] = _load_before_touching(found[0, 6], rod, *case[1:])
     outcome, index, error, bx, by, moment, load = found[0].tolist()
     return int(outcome), int(index), load, error, bx, by, moment, out[0], u[0]

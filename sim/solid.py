@@ -185,7 +185,7 @@ def solve_solid(
     flux = field_array(field, L)
     clamp = rad_from_deg(support.clamp_angle_deg)
     outcome, _, limit, _, bx, by, moment, _, tip = solve_planar(
-        held.plain, flux, clamp, held.margin, stations(2), START_ORDER, PLAIN_STEP
+        held.plain, flux, clamp, held.margin, stations(61), START_ORDER, PLAIN_STEP
     )
     if outcome > GONE:
         from .solve import failure  # which calls this module
