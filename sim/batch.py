@@ -15,16 +15,18 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.errors import InputError
 from ..core.magnet import Magnet
 from ..core.progress import Progress, silent
 from ..core.units import MU0
-from .batch_lanes import HARD, solve_magnet, solve_uniform
+from .batch_lanes import HARD, solve_lanes
 from .fields import FLUX_LIMIT_T, PULLED_IN, STABLE, UNSTABLE
 from .magnet_field import magnet_block
 from .planar import OK_UNSTABLE, TOUCHES, solve_planar_rows
+from .planar_march import WX, WY, E, H, M
 
 Array = NDArray[np.float64]
 
@@ -198,56 +200,74 @@ def _solve_chunk(
 ) -> None:
     """Solve one chunk into `out`."""
     rods, total_mm, margins = _rods(columns)
-    # Rods that need equally many steps run side by side.
-    flux = np.abs(columns["flux_mT"]) * 1e-3 if magnet is None else np.ones(len(rods))
-    size = rods[:, :, 0] * np.sqrt(
-        rods[:, :, 1] * np.abs(rods[:, :, 2]) * flux[:, None]
-    )
-    order = np.argsort(np.ceil(2.0 * size.max(axis=1)), kind="stable")
-    rods, total_mm, margins = rods[order], total_mm[order], margins[order]
-    tips = np.empty((len(rods), 3))
-    error = np.empty(len(rods))
-    outcome = np.empty(len(rods), dtype=np.int8)
-    index = np.zeros(len(rods), dtype=np.int8)
+    n = len(rods)
+    none = np.empty(0)
     if magnet is None:
-        flux_T = columns["flux_mT"][order] * 1e-3
-        angle = np.radians(columns["angle_deg"][order])
-        solve_uniform(rods, flux_T, angle, tips, outcome, error)
-        hard = np.flatnonzero(outcome == HARD)
-        fields = _uniform_fields(flux_T[hard], columns["angle_deg"][order][hard])
+        flux_T, angle = columns["flux_mT"] * 1e-3, np.radians(columns["angle_deg"])
+        field = flux_T, np.cos(angle), np.sin(angle), none, none
     else:
-        fields = _magnet_fields(magnet, columns["gap_mm"][order], total_mm)
-        solve_magnet(rods, fields, margins, tips, outcome, error)
-        hard = np.flatnonzero(outcome == HARD)
-        fields = fields[hard]
+        field = none, none, none, _block(magnet), columns["gap_mm"]
+    tips = np.empty((n, 4))
+    outcome = np.empty(n, dtype=np.int8)
+    index = np.zeros(n, dtype=np.int8)
+    solve_lanes(rods, total_mm, margins, *field, tips, outcome)
+    hard = np.flatnonzero(outcome == HARD)
     if len(hard):
+        if magnet is None:
+            fields = _uniform_fields(flux_T[hard], columns["angle_deg"][hard])
+        else:
+            fields = _magnet_fields(magnet, columns["gap_mm"][hard], total_mm[hard])
         found = _solve_hard(rods[hard], fields, margins[hard])
-        tips[hard], outcome[hard], error[hard], index[hard] = found
-    out["tip_x_mm"][order] = tips[:, 0] * total_mm
-    out["tip_y_mm"][order] = tips[:, 1] * total_mm
-    out["tip_angle_deg"][order] = np.degrees(tips[:, 2])
-    out["error_mm"][order] = error * total_mm
-    out["outcome"][order] = outcome
-    out["morse_index"][order] = index
+        tips[hard], outcome[hard], index[hard] = found
+    out["tip_x_mm"] = tips[:, 0] * total_mm
+    out["tip_y_mm"] = tips[:, 1] * total_mm
+    out["tip_angle_deg"] = np.degrees(tips[:, 2])
+    out["error_mm"] = tips[:, 3] * total_mm
+    out["outcome"] = outcome
+    out["morse_index"] = index
 
 
 def _rods(columns: dict[str, Array]) -> tuple[Array, Array, Array]:
     """Return rods as `planar_march` takes them (n, k, 5), lengths, and margins."""
     length = columns["length_mm"]
-    total = length.sum(axis=1)
-    side = columns["side_mm"]
-    EI = columns["E_MPa"] * side**4 / 12.0
-    rods = np.zeros((*length.shape, 5))
-    rods[:, ::-1, 0] = length / total[:, None]
-    rods[:, ::-1, 1] = EI[:, :1] / EI
-    moment = side**2 * columns["remanence_mT"] * (1e-9 / MU0)
-    rods[:, ::-1, 2] = moment * (total**2 / EI[:, 0])[:, None]
-    if not np.all(np.isfinite(rods)):
+    rods = np.empty((*length.shape, 5))
+    total = np.empty(len(length))
+    margins = np.empty(len(length))
+    given = length, columns["E_MPa"], columns["side_mm"], columns["remanence_mT"]
+    if not _pack(*given, 1e-9 / MU0, rods, total, margins):
         raise InputError(
             "designs: length_mm, side_mm in mm and E_MPa in MPa must be of comparable "
             "size; instead received a design whose loads overflow"
         )
-    return rods, total, side.max(axis=1) / (2.0 * total)
+    return rods, total, margins
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _pack(length, modulus, side, remanence, moment, rods, total, margin):  # type: ignore[no-untyped-def]
+    """Fill `rods` from columns of shape (n, sections), root first.
+
+    `moment` is that of 1 mm2 and 1 mT, in A m. Return whether all is finite.
+    """
+    n, sections = length.shape
+    nothing = 0.0
+    for i in range(n):
+        total[i] = 0.0
+        widest = 0.0
+        for k in range(sections):
+            total[i] += length[i, k]
+            widest = max(widest, side[i, k])
+        margin[i] = widest / (2.0 * total[i])
+        EI = modulus[i, 0] * side[i, 0] ** 4 / 12.0
+        per_N = total[i] * total[i] / EI
+        for k in range(sections):
+            row = rods[i, sections - 1 - k]
+            area = side[i, k] * side[i, k]
+            row[H] = length[i, k] / total[i]
+            row[E] = EI / (modulus[i, k] * area * area / 12.0)
+            row[M] = area * remanence[i, k] * moment * per_N
+            row[WX] = row[WY] = 0.0
+            nothing += 0.0 * (row[H] + row[E] + row[M])
+    return nothing == 0.0
 
 
 def _uniform_fields(flux_T: Array, angle_deg: Array) -> Array:
@@ -258,16 +278,20 @@ def _uniform_fields(flux_T: Array, angle_deg: Array) -> Array:
     return fields
 
 
-def _magnet_fields(magnet: Magnet, gap_mm: Array, total_mm: Array) -> Array:
+def _block(magnet: Magnet) -> Array:
     if magnet.elevation_deg != 0.0 or magnet.offset_mm[2] != 0.0:
         raise InputError(
             "magnet elevation_deg in deg and offset_mm[2] in mm must be 0 for batches, "
             f"which are planar; instead received {magnet.elevation_deg!r} deg and "
             f"{magnet.offset_mm[2]!r} mm"
         )
+    return magnet_block(magnet, length_mm=0.0, gap_mm=0.0)
+
+
+def _magnet_fields(magnet: Magnet, gap_mm: Array, total_mm: Array) -> Array:
     fields = np.empty((len(gap_mm), 17))
     fields[:, 0] = 1.0
-    fields[:, 1:] = magnet_block(magnet, length_mm=0.0, gap_mm=0.0)
+    fields[:, 1:] = _block(magnet)
     fields[:, 4:7] -= gap_mm[:, None] * np.array(magnet.axes()[2])
     fields[:, 4] += total_mm
     fields[:, 1:7] /= total_mm[:, None]
@@ -276,18 +300,17 @@ def _magnet_fields(magnet: Magnet, gap_mm: Array, total_mm: Array) -> Array:
 
 def _solve_hard(
     rods: Array, fields: Array, margins: Array
-) -> tuple[Array, Array, Array, Array]:
-    """Solve the designs that left the lanes: tips, outcomes, errors, indices."""
+) -> tuple[Array, Array, Array]:
+    """Solve the designs that left the lanes: tips and errors, outcomes, indices."""
     stations = np.linspace(0.0, 1.0, 41)[None]
     found, curves, _ = solve_planar_rows(
         rods, fields, 0.0, margins, stations, _ORDER, _STEP
     )
-    tips = curves[:, :3, -1]
-    outcome, index, error = found[:, 0], found[:, 1], found[:, 2]
+    outcome, index = found[:, 0], found[:, 1]
+    tips = np.column_stack([curves[:, :3, -1], found[:, 2]])
     gone = outcome > OK_UNSTABLE
     touching = outcome == TOUCHES
     outcome = np.where(touching, 4, np.minimum(outcome, NOT_SOLVED))
     tips[gone] = np.nan
-    error[gone] = np.nan
     index[gone] = -1
-    return tips, outcome, error, index
+    return tips, outcome, index

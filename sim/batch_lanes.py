@@ -1,14 +1,17 @@
 """Many planar rods side by side: Newton on vectors of rods.
 
-Dimensionless as `planar_march`, for rods of one sign of magnetisation (in a magnet's
-field: of one load per tesla) and no weight, by Taylor steps of order 8. A last march
-with steps half as long corrects the result. Its own error is 2^-8 of what it changes,
-plus the square of that; the bound given takes 2^-6 and four times the square.
+Dimensionless as `planar_march`, for rods of one sign of magnetisation (before a magnet:
+of one load per tesla) and no weight, by Taylor steps of order 8. The unknowns are the
+angle gamma of the tip from its load, as sine and cosine, and the tip's position. A last
+march with steps half as long corrects the result, with the Newton matrix of the march
+before. Its own error is 2^-8 of what it changes (up to 2^-6 where the leading term
+passes through zero), and what it leaves is that change times the one before; the bound
+given takes 2^-5 and sixteen times the product.
 
 A rod leaves this fast lane (its outcome is `HARD`) when it is long in units of its
 boundary layer, near antiparallel to the field, near the magnet, when Newton's
 corrections do not shrink as they should, or when the Jacobi determinant is not clearly
-positive: `planar.equilibrium` decides those.
+positive: `planar.solve_planar_rows` decides those.
 """
 
 from __future__ import annotations
@@ -20,360 +23,414 @@ import numpy as np
 from ..core.jit import njit
 from .magnet_field import inside, plane_flux
 from .planar_march import E, H, M
-from .taylor8 import ROWS, lane_step
+from .taylor8 import COLUMN, LANES, SERIES, STATE, column_step, state_step
 
-LANES = 64
 HARD = 9
 """Outcome of a rod that the lanes leave to the scalar solver."""
 STEP_UNIFORM = 0.6
-"""Largest h sqrt(e P) of one step: errors stay below 1e-5 mm for rods of 30 mm."""
-STEP_MAGNET = 0.4
+"""What one step takes: errors stay below 1e-5 mm for rods of 30 mm."""
+STEP_MAGNET = 0.48
 """The same, for errors below 1e-6 mm."""
 MOST_STEPS = 4
 """Most steps in a section."""
 LONGEST_ROD = 3.0
 """Largest sum of them: up to 3 pi / 2 there is one solution with gamma rising to T."""
-CLOSE = 3e-5
-"""Correction after which one more is below 1e-9."""
+ANTIPARALLEL = -0.996
+"""Least cosine between the clamp's direction and the load's."""
+CLOSE = 2e-4
+"""Correction after which the last march leaves about 1e-9."""
 ROUNDING = 1e-12
+OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
+
+# Offsets, in one array of work space, of what the lanes hold. With constant distances
+# the compiler knows that nothing overlaps, and runs the loops over lanes on vectors.
+_SIN, _COS, _X, _Y = (LANES * k for k in range(4))
+"""Of gamma, and the tip's position."""
+_FLUX, _CF, _SF, _BX, _BY, _TX, _TY = (LANES * k for k in range(4, 11))
+"""Flux, direction of the load, and by x and y the gradients of both."""
+_H, _E, _P, _M = (LANES * k for k in range(11, 15))
+"""Of the step: length, compliance, load; and the moment of the tip's section."""
+_TURN, _MOVE, _SWING, _BEFORE, _LOW = (LANES * k for k in range(15, 20))
+"""Newton's corrections of gamma, position and direction, what they must not exceed, and
+the least d(gamma)/d(gamma_L) met in a march."""
+_Z = LANES * 20
+_C1 = _Z + LANES * STATE
+_C2 = _C1 + LANES * COLUMN
+_T = _C2 + LANES * COLUMN
+_PACK = _T + LANES * SERIES
+"""State, columns by tip angle and by load, series; then h, e, m of every section."""
 
 
-@njit(cache=True, nogil=True)
-def _turn(u, i, d):  # type: ignore[no-untyped-def]
-    """Turn the direction (u[1], u[0]) of a tip by `d`, to second order."""
-    t = 0.5 * d
-    f = 1.0 / (1.0 + t * t)
-    c = (1.0 - t * t) * f
-    s = 2.0 * t * f
-    s0 = u[0, i]
-    u[0, i] = s0 * c + u[1, i] * s
-    u[1, i] = u[1, i] * c - s0 * s
+@njit(**OPTIONS)
+def _load(x, y, length, gap, margin, sign, magnet, w, i):  # type: ignore[no-untyped-def]
+    """Set flux, direction of the load and gradients of rod `i` with its tip at (x, y).
+
+    Return False, and no flux, where there is no field or the magnet is in the way.
+    """
+    w[_FLUX + i] = 0.0
+    px = length * (x - 1.0) + gap * magnet[12]
+    py = length * y + gap * magnet[13]
+    if inside(magnet, px, py, 0.0, length * margin):
+        return False
+    b = plane_flux(magnet, px, py)
+    size = math.sqrt(b[0] * b[0] + b[1] * b[1])
+    if size < 1e-12:
+        return False
+    c = b[0] / size
+    s = b[1] / size
+    g = length / size
+    w[_FLUX + i] = size
+    w[_CF + i] = sign * c
+    w[_SF + i] = sign * s
+    w[_BX + i] = length * (c * b[2] + s * b[3])
+    w[_BY + i] = length * (c * b[3] + s * b[4])
+    w[_TX + i] = g * (c * b[3] - s * b[2])
+    w[_TY + i] = g * (c * b[4] - s * b[3])
+    return True
 
 
-@njit(cache=True, nogil=True)
-def _begin(count, u, z):  # type: ignore[no-untyped-def]
-    """Set the states at the tips, whose sin and cos are the rows of `u`."""
-    for r in range(2, ROWS):
-        for i in range(count):
-            z[r, i] = 0.0
-    for i in range(count):
-        z[0, i] = u[0, i]
-        z[1, i] = u[1, i]
-        z[5, i] = 1.0
+@njit(**OPTIONS)
+def _ready(rod, size, cosine, pull, step):  # type: ignore[no-untyped-def]
+    """Return the rod's compliance to its load, and how many steps a section needs.
 
-
-@njit(cache=True, nogil=True)
-def _march(count, rods, size, steps, u, z, h, e, p, low):  # type: ignore[no-untyped-def]
-    """March all rods; `low` is the least d(gamma)/d(gamma_L) met on the way."""
-    _begin(count, u, z)
-    for i in range(count):
-        low[i] = 1.0
-    for k in range(rods.shape[1]):
-        for i in range(count):
-            h[i] = rods[i, k, H] / steps
-            e[i] = rods[i, k, E]
-            p[i] = abs(rods[i, k, M]) * size[i]
-        for _ in range(steps):
-            lane_step(count, h, e, p, z)
-            for i in range(count):
-                low[i] = min(low[i], z[5, i])
-
-
-@njit(cache=True, nogil=True)
-def _ready(rods, size, i, step):  # type: ignore[no-untyped-def]
-    """Return the rod's compliance to its load (-1: too long) and how many steps."""
+    0 steps: not for the lanes, as the rod is too long, or as the straight rod may be
+    unstable under compression and `pull`, the change of the load across the rod as its
+    tip moves across (neither is, by itself, where its product with a compliance is
+    below 1; nor both, where the sum is: Dunkerley). What one step takes is that of
+    `planar_march.substeps`, with the most that the moment can come to: between tip and
+    clamp, e q^2 / 2 = P (cos gamma_L - cos gamma) < P (1 - cos T).
+    """
+    across = 0.0
+    bend = math.sqrt(1.5 - 0.5 * cosine)
     sigma = 0.0
     total = 0.0
     soft = 0.0
     longest = 0.0
-    for k in range(rods.shape[1]):
-        hk = rods[i, k, H]
-        ep = rods[i, k, E] * abs(rods[i, k, M]) * size
+    for k in range(rod.shape[0]):
+        hk = rod[k, H]
+        ep = rod[k, E] * abs(rod[k, M]) * size
         z = hk * math.sqrt(ep)
         longest = max(longest, z)
         total += z
         soft += ep * hk * (sigma + 0.5 * hk)
+        across += rod[k, E] * hk * (sigma * (sigma + hk) + hk * hk / 3.0)
         sigma += hk
-    steps = math.ceil(longest / step)
-    if not total < LONGEST_ROD or steps > MOST_STEPS:
-        return -1.0, 1
-    return soft, max(steps, 1)
+    longest *= bend / step
+    if not total < LONGEST_ROD or longest > MOST_STEPS:
+        return soft, 0
+    if pull > 0.0 and pull * across + soft * max(0.0, -cosine) >= 1.0:
+        return soft, 0
+    return soft, max(1, math.ceil(longest))
 
 
-@njit(cache=True, nogil=True)
-def _guess(soft, st, ct, u, i):  # type: ignore[no-untyped-def]
-    """Guess sin and cos of gamma at the tip from those of T at the clamp.
+@njit(**OPTIONS)
+def _alike(rod, exactly):  # type: ignore[no-untyped-def]
+    """Tell whether all sections are magnetised the same way, or exactly the same."""
+    for k in range(1, rod.shape[0]):
+        if rod[k, M] * rod[0, M] < 0.0 or (exactly and rod[k, M] != rod[0, M]):
+            return False
+    return True
 
-    theta_L = atan2(soft sin T, 1 + 0.81 soft cos T) is right for soft rods and at the
-    Euler load, and within a few hundredths between.
+
+@njit(**OPTIONS)
+def _survey(rods, length, margin, flux, cosine, sine, magnet, gap, w, start, steps):  # type: ignore[no-untyped-def]
+    """Find the load on each straight rod, and how many steps it needs (0: hard).
+
+    `start` receives the compliance to the load, the flux and the load's direction.
     """
-    a = 1.0 + 0.81 * soft * ct
-    b = soft * st
-    f = 1.0 / math.sqrt(a * a + b * b)
-    u[0, i] = (st * a - ct * b) * f
-    u[1, i] = (ct * a + st * b) * f
-    return math.atan2(b, a)
+    uniform = magnet.shape[0] == 0
+    step = STEP_UNIFORM if uniform else STEP_MAGNET
+    pull = 0.0
+    for i in range(rods.shape[0]):
+        sign = -1.0 if rods[i, 0, M] < 0.0 else 1.0
+        known = _alike(rods[i], not uniform)
+        if uniform:
+            turn = -sign if flux[i] < 0.0 else sign
+            start[i, 1] = abs(flux[i])
+            start[i, 2] = turn * cosine[i]
+            start[i, 3] = turn * sine[i]
+        elif known and not _near(1.0, 0.0, length[i], gap[i], margin[i], magnet):
+            known = _load(1.0, 0.0, length[i], gap[i], 0.0, sign, magnet, w, 0)
+            start[i, 1] = w[_FLUX]
+            start[i, 2] = w[_CF]
+            start[i, 3] = w[_SF]
+            # d(m B sin phi) / dy
+            pull = w[_BY] * w[_SF] + w[_FLUX] * w[_CF] * w[_TY]
+            pull *= abs(rods[i, 0, M])
+        else:
+            known = False
+        steps[i] = 0
+        if known and start[i, 2] > ANTIPARALLEL:
+            start[i, 0], steps[i] = _ready(
+                rods[i], start[i, 1], start[i, 2], pull, step
+            )
 
 
-@njit(cache=True, nogil=True)
-def solve_uniform(rods, flux, angle, tips, outcome, error):  # type: ignore[no-untyped-def]
-    """Solve rods in uniform fields; angles from the clamp's direction, clamp at 0.
+@njit(**OPTIONS)
+def _sorted(steps):  # type: ignore[no-untyped-def]
+    """Return the rows that have steps, those with equally many side by side."""
+    ends = np.zeros(MOST_STEPS + 1, dtype=np.int64)
+    for n in steps:
+        ends[n] += 1
+    ends[0] = 0
+    for n in range(1, MOST_STEPS + 1):
+        ends[n] += ends[n - 1]
+    rows = np.empty(ends[MOST_STEPS], dtype=np.int64)
+    for i in range(steps.shape[0] - 1, -1, -1):
+        if steps[i] > 0:
+            ends[steps[i]] -= 1
+            rows[ends[steps[i]]] = i
+    return rows
 
-    Parameters
-    ----------
-    rods : ndarray, shape (n, sections, 5)
-        Tip first.
-    flux, angle : ndarray, shape (n,)
-        In T and rad.
-    tips : ndarray, shape (n, 3)
-        On return x, y, theta of the tips, lengths over L.
-    outcome, error : ndarray, shape (n,)
-        0 or `HARD`; error bound over L.
+
+@njit(**OPTIONS)
+def _begin(rows, rods, start, w, outcome):  # type: ignore[no-untyped-def]
+    """Guess the tips from compliances to the load and its directions at first.
+
+    With T = -phi at the clamp, gamma = T - atan2(soft sin T, 1 + 0.81 soft cos T) is
+    right for soft rods and at the Euler load, and within a few hundredths between.
     """
-    z = np.empty((ROWS, LANES))
-    u = np.empty((2, LANES))
-    goal = np.empty((4, LANES))
-    work = np.empty((5, LANES))
-    for first in range(0, rods.shape[0], LANES):
-        count = min(LANES, rods.shape[0] - first)
-        block = rods[first : first + count]
-        _uniform_block(
-            count, block, flux[first:], angle[first:], z, u, goal, work,
-            tips[first:], outcome[first:], error[first:],
-        )  # fmt: skip
+    for i in range(rows.shape[0]):
+        row = rows[i]
+        outcome[row] = 0
+        soft, c, s = start[row, 0], start[row, 2], -start[row, 3]
+        a = 1.0 + 0.81 * soft * c
+        b = soft * s
+        f = 1.0 / math.sqrt(a * a + b * b)
+        theta = math.atan2(b, a)
+        w[_SIN + i] = (s * a - c * b) * f
+        w[_COS + i] = (c * a + s * b) * f
+        w[_X + i] = 1.0 - 0.25 * theta * theta
+        w[_Y + i] = -0.65 * theta
+        w[_FLUX + i] = start[row, 1]
+        w[_CF + i] = c
+        w[_SF + i] = -s
+        w[_BX + i] = w[_BY + i] = w[_TX + i] = w[_TY + i] = 0.0
+        w[_M + i] = abs(rods[row, 0, M])
+        w[_BEFORE + i] = 0.6
+        for k in range(rods.shape[1]):
+            at = _PACK + 3 * k * LANES + i
+            w[at] = rods[row, k, H]
+            w[at + LANES] = rods[row, k, E]
+            w[at + 2 * LANES] = abs(rods[row, k, M])
 
 
-@njit(cache=True, nogil=True)
-def _uniform_block(count, rods, flux, angle, z, u, goal, work, tips, outcome, error):  # type: ignore[no-untyped-def]
-    """Solve up to LANES rods. `goal`: sin and cos of T, and of phi; `work`: scratch."""
-    h, e, p, low, size = work[0], work[1], work[2], work[3], work[4]
-    steps = 1
+@njit(**OPTIONS)
+def _part(w, first, rows):  # type: ignore[no-untyped-def]
+    return w[first : first + rows * LANES]
+
+
+@njit(**OPTIONS)
+def _march(count, sections, steps, columns, w):  # type: ignore[no-untyped-def]
+    """March all rods, with no column, the tip angle's or also the load's."""
+    z = _part(w, _Z, STATE)
+    c1 = _part(w, _C1, COLUMN)
+    c2 = _part(w, _C2, COLUMN)
+    t = _part(w, _T, SERIES)
+    h = _part(w, _H, 1)
+    e = _part(w, _E, 1)
+    p = _part(w, _P, 1)
+    z[:] = 0.0
     for i in range(count):
-        sign = -1.0 if rods[i, 0, M] * flux[i] < 0.0 else 1.0
-        sf = sign * math.sin(angle[i])
-        cf = sign * math.cos(angle[i])
-        goal[3, i] = cf
-        goal[2, i] = sf
-        # The rod is mirrored so that gamma at the clamp, T = |phi|, is positive.
-        goal[0, i] = abs(sf)
-        goal[1, i] = cf
-        size[i] = abs(flux[i])
-        soft, wanted = _ready(rods, size[i], i, STEP_UNIFORM)
-        steps = max(steps, wanted)
-        outcome[i] = 0
-        if soft < 0.0 or cf < -0.996:
-            outcome[i] = HARD
-            size[i] = 0.0
-            soft = 0.0
-        for k in range(1, rods.shape[1]):
-            if rods[i, k, M] * rods[i, 0, M] < 0.0:
-                outcome[i] = HARD
-        _guess(soft, goal[0, i], goal[1, i], u, i)
-    for _ in range(5):
-        _march(count, rods, size, steps, u, z, h, e, p, low)
-        largest = 0.0
+        w[_Z + i] = w[_SIN + i]
+        w[_Z + LANES + i] = w[_COS + i]
+    if columns > 0:
+        c1[:] = 0.0
+        c2[:] = 0.0
         for i in range(count):
-            miss = z[0, i] * goal[1, i] - z[1, i] * goal[0, i]
-            d = -miss / z[5, i]
-            if outcome[i] == 0:
-                largest = max(largest, abs(d))
-            _turn(u, i, d)
-            tips[i, 0] = -(z[3, i] + d * z[7, i])
-            tips[i, 1] = -(z[4, i] + d * z[8, i])
-        if largest < CLOSE:
-            break
-    _march(count, rods, size, 2 * steps, u, z, h, e, p, low)
-    for i in range(count):
-        _close_uniform(i, u, z, goal, low[i], tips, outcome, error)
-
-
-@njit(cache=True, nogil=True)
-def _bound(change):  # type: ignore[no-untyped-def]
-    """Bound what a last correction of this size leaves (module docstring)."""
-    return change / 64.0 + 4.0 * change * change + ROUNDING
-
-
-@njit(cache=True, nogil=True)
-def _close_uniform(i, u, z, goal, low, tips, outcome, error):  # type: ignore[no-untyped-def]
-    """Correct a rod by what the half steps found, and accept it or not."""
-    sine = z[0, i] * goal[1, i] - z[1, i] * goal[0, i]
-    cosine = z[1, i] * goal[1, i] + z[0, i] * goal[0, i]
-    d = -sine / z[5, i]
-    x = -(z[3, i] + d * z[7, i])
-    y = -(z[4, i] + d * z[8, i])
-    moved = abs(x - tips[i, 0]) + abs(y - tips[i, 1])
-    error[i] = _bound(2.0 * abs(d) + abs(sine) + moved)
-    # theta at the tip is gamma - T, then turned back by phi, then mirrored back.
-    st = u[0, i] * goal[1, i] - u[1, i] * goal[0, i]
-    ct = u[1, i] * goal[1, i] + u[0, i] * goal[0, i]
-    side = -1.0 if goal[2, i] < 0.0 else 1.0
-    tips[i, 0] = goal[1, i] * x + goal[0, i] * y
-    tips[i, 1] = side * (goal[0, i] * x - goal[1, i] * y)
-    tips[i, 2] = -side * (math.atan2(st, ct) + d)
-    good = cosine > 0.9 and low > 0.05 and u[0, i] >= 0.0 and abs(d) < 1e-3
-    if not good:
-        outcome[i] = HARD
-
-
-@njit(cache=True, nogil=True)
-def solve_magnet(rods, fields, margin, tips, outcome, error):  # type: ignore[no-untyped-def]
-    """Solve rods before magnets (blocks in lengths of L), clamp at 0.
-
-    As `solve_uniform`; `fields`, shape (n, 17), are the fields of `planar_march` and
-    `margin`, shape (n,), is half a side over L: tips nearer to the magnet are `HARD`.
-    """
-    z = np.empty((ROWS, LANES))
-    u = np.empty((4, LANES))
-    f = np.empty((7, LANES))
-    work = np.empty((7, LANES))
-    for first in range(0, rods.shape[0], LANES):
-        count = min(LANES, rods.shape[0] - first)
-        block = rods[first : first + count]
-        _magnet_block(
-            count, block, fields[first:], margin[first:], z, u, f, work,
-            tips[first:], outcome[first:], error[first:],
-        )  # fmt: skip
-
-
-@njit(cache=True, nogil=True)
-def _magnet_block(count, rods, fields, margin, z, u, f, work, tips, outcome, error):  # type: ignore[no-untyped-def]
-    """Solve up to LANES rods. `u`: sin, cos of gamma, x and y of the tip; `f`: load."""
-    h, e, p, low, before = work[0], work[1], work[2], work[3], work[4]
-    size = work[5]
-    steps = 1
-    for i in range(count):
-        outcome[i] = 0
-        before[i] = 0.6
-        for k in range(1, rods.shape[1]):
-            if rods[i, k, M] != rods[i, 0, M]:
-                outcome[i] = HARD
-        u[2, i] = 1.0
-        u[3, i] = 0.0
-        u[0, i] = 0.0
-        u[1, i] = 1.0
-        _tip_load(rods, fields, i, 0.0, u, f, size, outcome)
-        soft, wanted = _ready(rods, size[i], i, STEP_MAGNET)
-        steps = max(steps, wanted)
-        if soft < 0.0 or f[1, i] < -0.996:
-            outcome[i] = HARD
-            soft = 0.0
-        # gamma = theta - phi: the clamp stands at T = -phi, the tip turns towards 0.
-        theta = _guess(soft, -f[2, i], f[1, i], u, i)
-        u[3, i] = -0.65 * theta
-        u[2, i] = 1.0 - 0.25 * theta * theta
-    for _ in range(7):
-        largest = 0.0
+            w[_C1 + i] = 1.0
+            w[_LOW + i] = 1.0
+    for k in range(sections):
+        at = _PACK + 3 * k * LANES
         for i in range(count):
-            _tip_load(rods, fields, i, margin[i], u, f, size, outcome)
-        _march(count, rods, size, steps, u, z, h, e, p, low)
-        for i in range(count):
-            d = _correct(i, u, z, f, abs(rods[i, 0, M]), work[6])
-            if outcome[i] == 0:
-                # From a guess instead of the straight rod: first within 0.6, then
-                # shrinking to a quarter or better, as in `planar.newton`.
-                if not d < before[i]:
-                    outcome[i] = HARD
-                largest = max(largest, d)
-                before[i] = max(0.25 * d, 1e-7)
-        if largest < CLOSE:
-            break
-    for i in range(count):
-        _tip_load(rods, fields, i, margin[i], u, f, size, outcome)
-    _march(count, rods, size, 2 * steps, u, z, h, e, p, low)
-    for i in range(count):
-        phi_s = u[0, i] * f[1, i] + u[1, i] * f[2, i]
-        phi_c = u[1, i] * f[1, i] - u[0, i] * f[2, i]
-        d = _correct(i, u, z, f, abs(rods[i, 0, M]), work[6])
-        error[i] = _bound(3.0 * d)
-        tips[i, 0] = u[2, i]
-        tips[i, 1] = u[3, i]
-        tips[i, 2] = math.atan2(phi_s, phi_c) + work[6, i]
-        if not (d < 1e-3 and low[i] > 0.05) or _near(fields, margin, u, i):
-            outcome[i] = HARD
+            h[i] = w[at + i] / steps
+            e[i] = w[at + LANES + i]
+            p[i] = w[at + 2 * LANES + i] * w[_FLUX + i]
+        for _ in range(steps):
+            state_step(count, h, e, p, z, t)
+            if columns > 0:
+                column_step(count, h, e, p, t, 0.0, c1)
+                for i in range(count):
+                    w[_LOW + i] = min(w[_LOW + i], w[_C1 + i])
+            if columns > 1:
+                column_step(count, h, e, p, t, 1.0, c2)
 
 
-@njit(cache=True, nogil=True)
-def _tip_load(rods, fields, i, margin, u, f, size, outcome):  # type: ignore[no-untyped-def]
-    """Evaluate the load at a tip: f holds its size, direction, and their gradients.
+@njit(**OPTIONS)
+def _correct(count, w):  # type: ignore[no-untyped-def]
+    """Make one Newton step on (gamma, x_L, y_L) of all rods.
 
-    Rows: flux, cos phi, sin phi, d(flux)/dx and /dy, dphi/dx and /dy.
+    Sets the sizes of the corrections of angle and position, NaN or infinite where a rod
+    is not stable, and how far the tip swings.
     """
-    if outcome[i] != 0 or inside(fields[i, 1:], u[2, i], u[3, i], 0.0, margin):
-        outcome[i] = HARD
-        size[i] = 0.0
-        return
-    b = plane_flux(fields[i, 1:], u[2, i], u[3, i])
-    flux = math.sqrt(b[0] * b[0] + b[1] * b[1])
-    if flux < 1e-12:
-        outcome[i] = HARD
-        size[i] = 0.0
-        return
-    sign = -1.0 if rods[i, 0, M] < 0.0 else 1.0
-    f[0, i] = flux
-    f[1, i] = sign * b[0] / flux
-    f[2, i] = sign * b[1] / flux
-    f[3, i] = (b[0] * b[2] + b[1] * b[3]) / flux
-    f[4, i] = (b[0] * b[3] + b[1] * b[4]) / flux
-    f[5, i] = (b[0] * b[3] - b[1] * b[2]) / (flux * flux)
-    f[6, i] = (b[0] * b[4] - b[1] * b[3]) / (flux * flux)
-    size[i] = flux
+    for i in range(count):
+        cf = w[_CF + i]
+        sf = w[_SF + i]
+        sine = w[_SIN + i]
+        cosine = w[_COS + i]
+        x = w[_Z + 3 * LANES + i]
+        y = w[_Z + 4 * LANES + i]
+        rt = w[_Z + i] * cf + w[_Z + LANES + i] * sf
+        rx = x + cf * w[_X + i] + sf * w[_Y + i]
+        ry = y - sf * w[_X + i] + cf * w[_Y + i]
+        px = w[_M + i] * w[_BX + i]
+        py = w[_M + i] * w[_BY + i]
+        fx = w[_TX + i]
+        fy = w[_TY + i]
+        tt = w[_C1 + i]
+        xt = w[_C1 + 2 * LANES + i]
+        yt = w[_C1 + 3 * LANES + i]
+        tx = w[_C2 + i] * px + fx
+        ty = w[_C2 + i] * py + fy
+        xx = cf + w[_C2 + 2 * LANES + i] * px - fx * y
+        xy = sf + w[_C2 + 2 * LANES + i] * py - fy * y
+        yx = -sf + w[_C2 + 3 * LANES + i] * px + fx * x
+        yy = cf + w[_C2 + 3 * LANES + i] * py + fy * x
+        a = xx * yy - xy * yx
+        b = xy * yt - xt * yy
+        c = xt * yx - xx * yt
+        det = tt * a + tx * b + ty * c
+        g = -1.0 / det if det > 1e-3 else math.inf
+        d0 = g * (a * rt + (ty * yx - tx * yy) * rx + (tx * xy - ty * xx) * ry)
+        d1 = g * (b * rt + (tt * yy - ty * yt) * rx + (ty * xt - tt * xy) * ry)
+        d2 = g * (c * rt + (tx * yt - tt * yx) * rx + (tt * xx - tx * xt) * ry)
+        # The direction of the tip turns by d0, to second order.
+        h = 0.5 * d0
+        f = 1.0 / (1.0 + h * h)
+        w[_SIN + i] = f * (sine * (1.0 - h * h) + cosine * d0)
+        w[_COS + i] = f * (cosine * (1.0 - h * h) - sine * d0)
+        w[_X + i] += d1
+        w[_Y + i] += d2
+        w[_TURN + i] = abs(d0)
+        w[_MOVE + i] = abs(d1) + abs(d2)
+        w[_SWING + i] = d0 + fx * d1 + fy * d2
 
 
-@njit(cache=True, nogil=True)
-def _correct(i, u, z, f, m, turn):  # type: ignore[no-untyped-def]
-    """Make one Newton step on (gamma, x_L, y_L); return its size, inf if unstable.
-
-    `turn[i]` becomes the change of theta at the tip.
-    """
-    cf = f[1, i]
-    sf = f[2, i]
-    x = z[3, i]
-    y = z[4, i]
-    rt = z[0, i] * cf + z[1, i] * sf
-    rx = x + cf * u[2, i] + sf * u[3, i]
-    ry = y - sf * u[2, i] + cf * u[3, i]
-    px = m * f[3, i]
-    py = m * f[4, i]
-    tt = z[5, i]
-    xt = z[7, i]
-    yt = z[8, i]
-    tx = z[9, i] * px + f[5, i]
-    ty = z[9, i] * py + f[6, i]
-    xx = cf + z[11, i] * px - f[5, i] * y
-    xy = sf + z[11, i] * py - f[6, i] * y
-    yx = -sf + z[12, i] * px + f[5, i] * x
-    yy = cf + z[12, i] * py + f[6, i] * x
-    a = xx * yy - xy * yx
-    det = tt * a - tx * (xt * yy - xy * yt) + ty * (xt * yx - xx * yt)
-    if not det > 1e-3:
-        return math.inf
-    g = -1.0 / det
-    d0 = g * (a * rt + (ty * yx - tx * yy) * rx + (tx * xy - ty * xx) * ry)
-    d1 = g * (
-        (xy * yt - xt * yy) * rt + (tt * yy - ty * yt) * rx + (ty * xt - tt * xy) * ry
-    )
-    d2 = g * (
-        (xt * yx - xx * yt) * rt + (tx * yt - tt * yx) * rx + (tt * xx - tx * xt) * ry
-    )
-    _turn(u, i, d0)
-    u[2, i] += d1
-    u[3, i] += d2
-    turn[i] = d0 + f[5, i] * d1 + f[6, i] * d2
-    return max(abs(d0), abs(d1), abs(d2))
-
-
-@njit(cache=True, nogil=True)
-def _near(fields, margin, u, i):  # type: ignore[no-untyped-def]
-    """Tell whether a rod might touch its magnet.
+@njit(**OPTIONS)
+def _near(x, y, length, gap, margin, magnet):  # type: ignore[no-untyped-def]
+    """Tell whether a rod with its tip at (x, y) might touch its magnet.
 
     A curve of length 1 between two points at a distance d stays within
     sqrt(1 - d^2) / 2 of the straight line between them (an ellipse); eight pieces of
     that line are checked.
     """
-    d2 = u[2, i] * u[2, i] + u[3, i] * u[3, i]
-    reach = 0.5 * math.sqrt(max(0.0, 1.0 - d2)) + margin[i] + math.sqrt(d2) / 16.0
+    d2 = x * x + y * y
+    far = 0.5 * math.sqrt(max(0.0, 1.0 - d2)) + math.sqrt(d2) / 16.0
+    far = length * (far + margin)
+    ox = gap * magnet[12] - length
+    oy = gap * magnet[13]
     found = False
     for k in range(9):
-        r = k / 8.0
-        found = found or inside(fields[i, 1:], r * u[2, i], r * u[3, i], 0.0, reach)
+        r = length * k / 8.0
+        found = found or inside(magnet, r * x + ox, r * y + oy, 0.0, far)
     return found
+
+
+@njit(**OPTIONS)
+def _load_all(rows, rods, length, margin, magnet, gap, w, outcome):  # type: ignore[no-untyped-def]
+    """Set the loads at all tips; where there is none, the rod is `HARD`."""
+    for i in range(rows.shape[0]):
+        row = rows[i]
+        sign = -1.0 if rods[row, 0, M] < 0.0 else 1.0
+        if outcome[row] == 0 and not _load(
+            w[_X + i], w[_Y + i], length[row], gap[row], margin[row], sign, magnet, w, i
+        ):
+            outcome[row] = HARD
+
+
+@njit(**OPTIONS)
+def _judge(rows, weight, w, outcome):  # type: ignore[no-untyped-def]
+    """Return the largest correction; rods that do not converge well are `HARD`.
+
+    The first, from the guess, must be within 0.6, and each a quarter of the one before
+    or less (see `planar`). `weight` is that of the positions.
+    """
+    largest = 0.0
+    for i in range(rows.shape[0]):
+        d = max(w[_TURN + i], weight * w[_MOVE + i])
+        if not d < w[_BEFORE + i]:
+            outcome[rows[i]] = HARD
+        if outcome[rows[i]] == 0:
+            largest = max(largest, d)
+        w[_BEFORE + i] = max(0.25 * d, 1e-7)
+    return largest
+
+
+@njit(**OPTIONS)
+def _solve_block(  # type: ignore[no-untyped-def]
+    rows, rods, length, margin, magnet, gap, start, steps, w, out, outcome
+):
+    """Solve up to LANES rods."""
+    uniform = magnet.shape[0] == 0
+    count = rows.shape[0]
+    sections = rods.shape[1]
+    _begin(rows, rods, start, w, outcome)
+    for _ in range(8):
+        if not uniform:
+            _load_all(rows, rods, length, margin, magnet, gap, w, outcome)
+        _march(count, sections, steps, 1 if uniform else 2, w)
+        _correct(count, w)
+        if _judge(rows, 0.0 if uniform else 1.0, w, outcome) < CLOSE:
+            break
+    if not uniform:
+        _load_all(rows, rods, length, margin, magnet, gap, w, outcome)
+    _march(count, sections, 2 * steps, 0, w)
+    for i in range(count):
+        cf, sf, s, c = w[_CF + i], w[_SF + i], w[_SIN + i], w[_COS + i]
+        out[rows[i], 2] = math.atan2(s * cf + c * sf, c * cf - s * sf)
+    _correct(count, w)
+    for i in range(count):
+        row = rows[i]
+        cf, sf, x, y = w[_CF + i], w[_SF + i], w[_X + i], w[_Y + i]
+        change = w[_TURN + i] + w[_MOVE + i]
+        before = 4.0 * w[_BEFORE + i]
+        out[row, 0] = x
+        out[row, 1] = y
+        out[row, 2] += w[_SWING + i]
+        out[row, 3] = change / 32.0 + 16.0 * change * (change + before) + ROUNDING
+        root = w[_Z + LANES + i] * cf - w[_Z + i] * sf
+        # The solution that grows from zero load has gamma between 0 and T = -phi.
+        good = root > 0.9 and w[_LOW + i] > 0.05 and w[_SIN + i] * sf < 1e-12
+        if not (good and change < 1e-3 and before <= CLOSE):
+            outcome[row] = HARD
+            continue
+        if not uniform and _near(x, y, length[row], gap[row], margin[row], magnet):
+            outcome[row] = HARD
+
+
+@njit(**OPTIONS)
+def solve_lanes(  # type: ignore[no-untyped-def]
+    rods, length, margin, flux, cosine, sine, magnet, gap, out, outcome
+):
+    """Solve rods clamped along +x, in uniform fields or before a magnet.
+
+    Parameters
+    ----------
+    rods : ndarray, shape (n, sections, 5)
+        Tip first (see `planar_march`).
+    length, margin : ndarray, shape (n,)
+        Length in mm, and half the side over it: tips nearer to the magnet are `HARD`.
+    flux, cosine, sine : ndarray, shape (n,) or, before a magnet, (0,)
+        Of the uniform field, in T, and of its direction.
+    magnet : ndarray, shape (16,) or, in uniform fields, (0,)
+        `magnet_block` for no length and no gap, in mm.
+    gap : ndarray, shape (n,) or, in uniform fields, (0,)
+        In mm.
+    out : ndarray, shape (n, 4)
+        Receives x and y of the tip over L, its angle, and the error bound over L.
+    outcome : ndarray, shape (n,)
+        Receives 0 or `HARD`.
+    """
+    n, sections, _ = rods.shape
+    start = np.empty((n, 4))
+    steps = np.empty(n, dtype=np.int64)
+    w = np.zeros(_PACK + 3 * sections * LANES)
+    _survey(rods, length, margin, flux, cosine, sine, magnet, gap, w, start, steps)
+    outcome[:] = HARD
+    order = _sorted(steps)
+    for first in range(0, order.shape[0], LANES):
+        rows = order[first : first + LANES]
+        most = steps[rows[-1]]
+        _solve_block(
+            rows, rods, length, margin, magnet, gap, start, most, w, out, outcome
+        )

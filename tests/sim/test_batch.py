@@ -78,6 +78,42 @@ def test_agrees_with_one_by_one_within_its_error(magnet: Magnet | None) -> None:
         )
 
 
+@pytest.mark.parametrize("sections", [1, 4])
+def test_before_near_magnets_too(sections: int) -> None:
+    """Attraction, snapping, touching: every lane says what the single solver says."""
+    rng = np.random.default_rng(sections)
+    worst = 0.0
+    for _ in range(6):
+        n = 60
+        columns = {
+            "length_mm": rng.uniform(2.0, 20.0, (n, sections)),
+            "E_MPa": 10.0 ** rng.uniform(0.3, 1.7, (n, sections)),
+            "side_mm": rng.uniform(0.5, 1.5, n),
+            "remanence_mT": rng.uniform(5.0, 60.0, n) * rng.choice([-1.0, 1.0], n),
+            "gap_mm": rng.uniform(3.0, 60.0, n),
+        }
+        magnet = Magnet(
+            sides_mm=(25.0, 30.0, 40.0),
+            remanence_T=float(rng.choice([-1.2, 1.2])),
+            axis_angle_deg=float(rng.uniform(-180.0, 180.0)),
+            offset_mm=(float(rng.uniform(-20, 20)), float(rng.uniform(-20, 20)), 0.0),
+        )
+        found = solve_many(columns, magnet=magnet)
+        for i in range(n):
+            field = MagnetField(magnet=magnet, gap_mm=float(columns["gap_mm"][i]))
+            try:
+                solution = solve(one(columns, i), field)
+            except InputError:
+                assert OUTCOMES[found["outcome"][i]] == "touches the magnet"
+                continue
+            assert OUTCOMES[found["outcome"][i]] == solution.status
+            if solution.centreline is not None:
+                x, y = solution.centreline.tip_mm
+                miss = np.hypot(x - found["tip_x_mm"][i], y - found["tip_y_mm"][i])
+                worst = max(worst, miss / (found["error_mm"][i] + solution.error_mm))
+    assert worst < 1.0
+
+
 def test_structured_arrays_and_scalars() -> None:
     kind = np.dtype([("flux_mT", float), ("side_mm", float)])
     table = np.zeros(3, dtype=kind)
