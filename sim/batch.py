@@ -15,10 +15,10 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.errors import InputError
+from ..core.jit import njit
 from ..core.magnet import Magnet
 from ..core.progress import Progress, silent
 from ..core.units import MU0

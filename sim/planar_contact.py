@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 from ..core.jit import njit
-
 from .planar_march import PART
 
 _MOST_PIECES = 512
