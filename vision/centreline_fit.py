@@ -14,6 +14,7 @@ Units here are pixels and radians of the picture (y down).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -21,14 +22,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.jit import njit
+from .cholesky import factor, inverse, solved, solved_half
 from .curve import Curve
-from .spline import Basis, add_squares, design, knots_between, penalty_on_bends
+from .spline import (
+    Basis,
+    add_squares,
+    combined,
+    design,
+    knots_between,
+    penalty_on_bends,
+)
 
 Array = NDArray[np.float64]
 
 SHARED = 8.0
 """Stations 1 px apart that carry one station's worth of information: bilinear samples,
 compressed pictures and shade on the paper make neighbours alike."""
+
+_FREE = 4
+"""Parameters that cost no penalty: origin, angle, curvature and its slope."""
 
 _FAIR = 0.1
 """Weight of the penalty before the last step, in units of the data's."""
@@ -147,32 +159,29 @@ def fit_curve(
     penalty = penalty_on_bends(knots)
     if theta is None:
         theta = _chord_angles(points)
+    step = float(s[1] - s[0])
     coefficients = _start(basis, theta, penalty * spacing**5)
-    path = _integrate(s, np.zeros(2), coefficients, basis, middle)
-    origin = np.mean((points - path.curve.points)[weights > 0.0], axis=0)
+    start, *_ = _path(step, np.zeros(2), coefficients, basis, middle)
+    origin = np.mean((points - start)[weights > 0.0], axis=0)
     for turn in range(iterations):
-        path = _integrate(s, origin, coefficients, basis, middle)
-        jacobian = _jacobian(path, middle, len(coefficients))
-        system = _solve(
-            jacobian, _residual(points, path, weights), weights, penalty, coefficients,
-            stiffness, shared, within, last=turn == iterations - 1,
+        path, angle, rate, rate_mid = _path(step, origin, coefficients, basis, middle)
+        jacobian = _jacobian(step, rate, rate_mid, middle, len(coefficients))
+        strength, normal, right, pull = _weighed(
+            jacobian, _residual(points, path, rate, weights), weights, penalty,
+            coefficients, math.nan if stiffness is None else stiffness, shared, within,
+            _FREE, turn == iterations - 1,
         )  # fmt: skip
-        turned = np.array([-path.rate[0, 1], path.rate[0, 0]])
-        origin = origin + system.change[0] * turned
-        coefficients = coefficients + system.change[1:]
-    path = _integrate(s, origin, coefficients, basis, middle)
-    residual = _residual(points, path, weights)
+        half = factor(normal)
+        change = solved(half, right - strength * pull)
+        origin = origin + change[0] * np.array([-rate[0, 1], rate[0, 0]])
+        coefficients = coefficients + change[1:]
+    path, angle, rate, _ = _path(step, origin, coefficients, basis, middle)
+    curve = Curve(s=s, points=path, theta=angle, kappa=basis.slopes(coefficients))
+    root = inverse(half)
     return _with_covariance(
-        path.curve, residual, weights, within, jacobian, system, basis
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class _System:
-    change: Array
-    inverse_root: Array
-    freedom: float
-    shared: float
+        curve, _residual(points, path, rate, weights), weights, within, shared,
+        jacobian, basis, root, float(_freedom(root, penalty, strength)),
+    )  # fmt: skip
 
 
 def _chord_angles(points: Array) -> Array:
@@ -180,88 +189,111 @@ def _chord_angles(points: Array) -> Array:
     return np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
 
 
+@njit(cache=True)
 def _start(basis: Basis, theta: Array, stiff: Array) -> Array:
     """Return coefficients of a smooth curve through given angles."""
     normal, right = 1e-3 * stiff, np.zeros(len(stiff))
-    normal.flat[:: len(right) + 1] += 1e-9
-    add_squares(basis.first, basis.value, np.ones(len(theta)), normal)
-    for k in range(4):
-        np.add.at(right, basis.first + k, basis.value[:, k] * theta)
-    return np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
-
-
-@dataclass(frozen=True, slots=True)
-class _Path:
-    """A curve with what its derivatives need."""
-
-    curve: Curve
-    rate: Array
-    rate_mid: Array
-
-
-def _integrate(
-    s: Array, origin: Array, coefficients: Array, basis: Basis, middle: Basis
-) -> _Path:
-    theta = basis.values(coefficients)
-    rate, points = np.empty((len(s), 2)), np.empty((len(s), 2))
-    rate_mid = np.empty((len(s) - 1, 2))
-    points[0] = origin
-    _walk(s[1] - s[0], theta, middle.values(coefficients), rate, rate_mid, points)
-    curve = Curve(s=s, points=points, theta=theta, kappa=basis.slopes(coefficients))
-    return _Path(curve, rate, rate_mid)
+    add_squares(basis.first, basis.value, np.ones(theta.size), normal)
+    for j in range(right.size):
+        normal[j, j] += 1e-9
+    for i in range(theta.size):
+        for j in range(4):
+            right[basis.first[i] + j] += basis.value[i, j] * theta[i]
+    return np.asarray(solved(factor(normal), right))
 
 
 @njit(cache=True)
-def _walk(
-    step: float, theta: Array, mid: Array, rate: Array, rate_mid: Array, points: Array
-) -> None:
-    """Fill unit tangents, and points by Simpson's rule on each interval."""
-    h = step / 6.0
-    rate[0, 0], rate[0, 1] = np.cos(theta[0]), np.sin(theta[0])
+def _path(
+    step: float, origin: Array, coefficients: Array, basis: Basis, middle: Basis
+) -> tuple[Array, Array, Array, Array]:
+    """Return points by Simpson's rule, angles, unit tangents there and half way."""
+    theta = combined(basis.first, basis.value, coefficients)
+    mid = combined(middle.first, middle.value, coefficients)
+    points = np.empty((theta.size, 2))
+    rate, rate_mid = np.empty((theta.size, 2)), np.empty((mid.size, 2))
+    for i in range(theta.size):
+        rate[i, 0], rate[i, 1] = np.cos(theta[i]), np.sin(theta[i])
+    points[0] = origin
     for i in range(mid.size):
         rate_mid[i, 0], rate_mid[i, 1] = np.cos(mid[i]), np.sin(mid[i])
-        rate[i + 1, 0], rate[i + 1, 1] = np.cos(theta[i + 1]), np.sin(theta[i + 1])
         for k in range(2):
-            mean = rate[i, k] + 4.0 * rate_mid[i, k] + rate[i + 1, k]
-            points[i + 1, k] = points[i, k] + h * mean
-
-
-def _residual(points: Array, path: _Path, weight: Array) -> Array:
-    """Distance of the measured points along the normal; 0 where there is none."""
-    away = points - path.curve.points
-    across = path.rate[:, 0] * away[:, 1] - path.rate[:, 1] * away[:, 0]
-    return np.where(weight == 0.0, 0.0, across)
-
-
-def _jacobian(path: _Path, middle: Basis, count: int) -> Array:
-    """Change of the normal position by origin (along its normal) and coefficients."""
-    jacobian = np.zeros((len(path.rate), count + 1))
-    step = path.curve.s[1] - path.curve.s[0]
-    _fill_jacobian(path.rate, path.rate_mid, middle.first, middle.value, step, jacobian)
-    return jacobian
+            mean = (rate[i, k] + 4.0 * rate_mid[i, k] + rate[i + 1, k]) / 6.0
+            points[i + 1, k] = points[i, k] + step * mean
+    return points, theta, rate, rate_mid
 
 
 @njit(cache=True)
-def _fill_jacobian(
-    rate: Array, rate_mid: Array, first: NDArray[np.int64], value: Array, step: float,
-    jacobian: Array,
-) -> None:  # fmt: skip
-    along = np.zeros((jacobian.shape[1] - 1, 2))
+def _residual(points: Array, path: Array, rate: Array, weight: Array) -> Array:
+    """Distance of the measured points along the normal; 0 where there is none."""
+    out = np.zeros(weight.size)
+    for i in range(weight.size):
+        if weight[i] > 0.0:
+            x, y = points[i, 0] - path[i, 0], points[i, 1] - path[i, 1]
+            out[i] = rate[i, 0] * y - rate[i, 1] * x
+    return out
+
+
+@njit(cache=True)
+def _jacobian(
+    step: float, rate: Array, rate_mid: Array, middle: Basis, count: int
+) -> Array:
+    """Change of the normal position by origin (along its normal) and coefficients."""
+    jacobian = np.zeros((len(rate), count + 1))
+    along = np.zeros((count, 2))
     end = 0
     for i in range(len(rate)):
         x, y = rate[i, 0], rate[i, 1]
         jacobian[i, 0] = x * rate[0, 0] + y * rate[0, 1]
         for k in range(end):
             jacobian[i, k + 1] = x * along[k, 1] - y * along[k, 0]
-        if i < first.size:
-            end = first[i] + 4
+        if i < len(rate_mid):
+            first = middle.first[i]
+            end = first + 4
             for j in range(4):
-                along[first[i] + j, 0] -= step * rate_mid[i, 1] * value[i, j]
-                along[first[i] + j, 1] += step * rate_mid[i, 0] * value[i, j]
+                along[first + j, 0] -= step * rate_mid[i, 1] * middle.value[i, j]
+                along[first + j, 1] += step * rate_mid[i, 0] * middle.value[i, j]
+    return jacobian
 
 
 @njit(cache=True)
-def _normal_equations(
+def _weighed(
+    jacobian: Array, residual: Array, weight: Array, penalty: Array,
+    coefficients: Array, strength: float, shared: float, within: float, free: int,
+    last: bool,
+) -> tuple[float, Array, Array, Array]:  # fmt: skip
+    """Return the weight of the penalty (if NaN: the most likely one) and the equations.
+
+    They are normal x = right - weight pull, with `free` unknowns that cost no penalty.
+    Neighbouring residuals share pixels, so `shared` of them count as one. Before the
+    last step any fair weight does: it moves only the point where the next one starts.
+    """
+    size = jacobian.shape[1]
+    normal, right, pull = np.zeros((size, size)), np.zeros(size), np.zeros(size)
+    _add_equations(jacobian, weight / shared, residual, normal, right)
+    data, bend, stored = np.trace(normal), np.trace(penalty), 0.0
+    for j in range(size - 1):
+        for k in range(size - 1):
+            pull[j + 1] += penalty[j, k] * coefficients[k]
+        stored += coefficients[j] * pull[j + 1]
+    scale = data / bend
+    # Parts of the rod without data must not make the matrix singular.
+    for j in range(size):
+        normal[j, j] += 1e-11 * data / size
+    normal[1:, 1:] += 1e-9 * scale * penalty
+    if np.isnan(strength):
+        strength = _FAIR * scale
+        if last:
+            total = (np.sum(weight * residual**2) + within) / shared
+            count = max(np.sum(weight) / shared - free, 1.0)
+            strength = _most_likely(
+                scale, normal, penalty, right, pull, total, stored, count, size - free
+            )
+    normal[1:, 1:] += strength * penalty
+    return strength, normal, right, pull
+
+
+@njit(cache=True)
+def _add_equations(
     jacobian: Array, weight: Array, residual: Array, normal: Array, right: Array
 ) -> None:
     """Add J^T W J and J^T W r; a row of J ends in zeros."""
@@ -279,47 +311,10 @@ def _normal_equations(
             normal[k, j] = normal[j, k]
 
 
-def _solve(
-    jacobian: Array, residual: Array, weight: Array, penalty: Array,
-    coefficients: Array, strength: float | None, shared: float, within: float, *,
-    last: bool,
-) -> _System:  # fmt: skip
-    """Solve for the change, with the most likely weight of the penalty (REML).
-
-    Neighbouring residuals share pixels, so `shared` of them count as one. Before the
-    last step any fair weight does: it moves only the point at which the next step is
-    taken.
-    """
-    size = jacobian.shape[1]
-    normal, right, full = np.zeros((size, size)), np.zeros(size), np.zeros((size, size))
-    _normal_equations(jacobian, weight / shared, residual, normal, right)
-    full[1:, 1:] = penalty
-    pull = np.zeros(size)
-    pull[1:] = penalty @ coefficients
-    scale = float(np.trace(normal) / np.trace(full))
-    # Parts of the rod without data must not make the matrix singular.
-    ridge = 1e-11 * float(np.trace(normal)) / size
-    normal.flat[:: size + 1] += ridge
-    normal += 1e-9 * scale * full
-    if not last:
-        fair = _FAIR * scale if strength is None else strength
-        change = np.linalg.solve(normal + fair * full, right - fair * pull)
-        return _System(np.asarray(change, dtype=np.float64), full, 0.0, shared)
-    if strength is None:
-        total = (float(weight @ residual**2) + within) / shared
-        stored = float(coefficients @ pull[1:])
-        count = max(float(weight.sum()) / shared - 4.0, 1.0)
-        strength = _most_likely(scale, normal, full, right, pull, total, stored, count)
-    stiff = normal + strength * full
-    root = np.asarray(np.linalg.inv(np.linalg.cholesky(stiff)), np.float64).T
-    change = root @ (root.T @ (right - strength * pull))
-    return _System(change, root, float(np.sum(root * (normal @ root))), shared)
-
-
 @njit(cache=True)
 def _most_likely(
     scale: float, normal: Array, penalty: Array, right: Array, pull: Array,
-    total: float, stored: float, count: float,
+    total: float, stored: float, count: float, rank: int,
 ) -> float:  # fmt: skip
     """Return the penalty weight of greatest restricted likelihood.
 
@@ -331,44 +326,37 @@ def _most_likely(
         for k in range(14) if turn == 0 else range(-3, 4):
             power = 4 * k - 36 if turn == 0 else centre + k
             weight = scale * 10.0 ** (0.25 * power)
-            gain, logs = _eliminated(normal + weight * penalty, right - weight * pull)
+            matrix = normal.copy()
+            matrix[1:, 1:] += weight * penalty
+            half = factor(matrix)
+            gain = np.sum(solved_half(half, right - weight * pull) ** 2)
+            logs = 2.0 * np.sum(np.log(np.diag(half)))
             left = max(total + weight * stored - gain, 1e-12 * total + 1e-30)
-            score = count * np.log(left) + logs - (len(right) - 4.0) * np.log(weight)
+            score = count * np.log(left) + logs - rank * np.log(weight)
             if score < least:
                 best, least = power, score
     return float(scale * 10.0 ** (0.25 * best))
 
 
 @njit(cache=True)
-def _eliminated(matrix: Array, right: Array) -> tuple[float, float]:
-    """Return right^T matrix^-1 right, and the logarithm of the determinant.
-
-    Cholesky's method, in place: the matrices are too small for a library's threads.
-    """
-    size = right.size
-    gain, logs = 0.0, 0.0
-    for k in range(size):
-        pivot = matrix[k, k]
-        if not pivot > 0.0:
-            return 0.0, np.inf
-        gain += right[k] ** 2 / pivot
-        logs += np.log(pivot)
-        for j in range(k + 1, size):
-            share = matrix[k, j] / pivot
-            right[j] -= share * right[k]
-            for i in range(j, size):
-                matrix[j, i] -= share * matrix[k, i]
-    return gain, logs
+def _freedom(root: Array, penalty: Array, strength: float) -> float:
+    """Trace of what maps the data onto the fit: the parameters less those held."""
+    held = 0.0
+    for j in range(len(penalty)):
+        for k in range(len(penalty)):
+            if penalty[j, k] != 0.0:
+                held += penalty[j, k] * np.sum(root[j + 1] * root[k + 1])
+    return len(root) - strength * held
 
 
 def _with_covariance(
-    curve: Curve, residual: Array, weight: Array, within: float, jacobian: Array,
-    system: _System, basis: Basis,
+    curve: Curve, residual: Array, weight: Array, within: float, shared: float,
+    jacobian: Array, basis: Basis, root: Array, freedom: float,
 ) -> CurveFit:  # fmt: skip
     """Widen the covariance by what the residuals of neighbours have in common."""
     used = weight > 0.0
     count, between = float(weight.sum()), float(weight @ residual**2)
-    noise = np.sqrt((between + within) / max(count - system.freedom, 1.0))
+    noise = np.sqrt((between + within) / max(count - freedom, 1.0))
     each = count / max(int(np.count_nonzero(used)), 1)
     alike = _correlation(residual, used, max(round(24.0 / each), 6))
     correlation = max(alike * each * between / max(between + within, 1e-300), 1.0)
@@ -377,10 +365,10 @@ def _with_covariance(
         residual=np.where(used, residual, np.nan),
         noise=float(noise),
         correlation=correlation,
-        freedom=system.freedom,
+        freedom=freedom,
         jacobian=jacobian,
         basis=basis,
-        root=system.inverse_root * noise * np.sqrt(correlation / system.shared),
+        root=root * noise * np.sqrt(correlation / shared),
     )
 
 

@@ -143,8 +143,7 @@ def find_edges(
     for side, (outwards, edge) in enumerate(((-1.0, low), (1.0, high))):
         _sample(grey, points, normals, edge, outwards, before, np.float32(sign), strip)
         _levels(strip, filters, levels)
-        for row in levels:
-            _smooth(row, smooth)
+        _smooth(levels, smooth)
         _cross(strip, before, levels[:3], reach, blur, out[side])
         out[side, 0] += outwards * edge
         out[side, 2:] = levels[3:]
@@ -252,20 +251,21 @@ def _level_filter(
 
 
 @njit(cache=True)
-def _smooth(values: Array, half: int) -> None:
-    """Replace by the mean over neighbours, NaN left out."""
-    count = values.size
-    old = values.copy()
-    total, number = 0.0, 0
-    for i in range(-half, count):
-        if i + half < count and not np.isnan(old[i + half]):
-            total += old[i + half]
-            number += 1
-        if i - half > 0 and not np.isnan(old[i - half - 1]):
-            total -= old[i - half - 1]
-            number -= 1
-        if i >= 0:
-            values[i] = total / number if number else np.nan
+def _smooth(rows: Array, half: int) -> None:
+    """Replace each value by the mean over its neighbours in the row, NaN left out."""
+    count = rows.shape[1]
+    for row in rows:
+        old = row.copy()
+        total, number = 0.0, 0
+        for i in range(-half, count):
+            if i + half < count and not np.isnan(old[i + half]):
+                total += old[i + half]
+                number += 1
+            if i - half > 0 and not np.isnan(old[i - half - 1]):
+                total -= old[i - half - 1]
+                number -= 1
+            if i >= 0:
+                row[i] = total / number if number else np.nan
 
 
 @njit(cache=True)

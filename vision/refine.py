@@ -312,7 +312,7 @@ def _fit(
         return fit_curve(
             s - first, measured, _held_ends(weights, s, width), theta=theta,
             spacing=max((1.0 if supple else 1.5) * width, (last - first) / 50.0),
-            joints=places,
+            joints=places, iterations=1,
             shared=(3.0 if supple else SHARED) / float(seen.s[1]),
             within=float(within[weights > 0.0].sum()),
         )  # fmt: skip

@@ -194,7 +194,7 @@ def _edge_distance(
     inside = depth[before_y : before_y + height, before_x : before_x + width]
     inside[[0, -1]] = 0.0
     inside[:, [0, -1]] = 0.0
-    return inside
+    return np.asarray(inside, dtype=np.float32)
 
 
 def _near(core: Mask, reach: float) -> Mask:

@@ -49,11 +49,11 @@ class Basis(NamedTuple):
 
     def values(self, coefficients: Array) -> Array:
         """Return the spline of these coefficients, shape (n,)."""
-        return np.asarray(_combined(self.first, self.value, coefficients))
+        return np.asarray(combined(self.first, self.value, coefficients))
 
     def slopes(self, coefficients: Array) -> Array:
         """Return its derivative, shape (n,)."""
-        return np.asarray(_combined(self.first, self.slope, coefficients))
+        return np.asarray(combined(self.first, self.slope, coefficients))
 
 
 def design(knots: Array, s: Array) -> Basis:
@@ -66,7 +66,8 @@ def design(knots: Array, s: Array) -> Basis:
 
 
 @njit(cache=True)
-def _combined(first: NDArray[np.int64], value: Array, coefficients: Array) -> Array:
+def combined(first: NDArray[np.int64], value: Array, coefficients: Array) -> Array:
+    """Return sums of four coefficients each, from `first` on, times their values."""
     out = np.zeros(first.size)
     for i in range(first.size):
         for j in range(4):
