@@ -36,6 +36,7 @@ _RESET_TRIES = 8
 _BANNER_S = 2.5
 _PATIENCE = 10.0
 _OFFSET_EVERY = 30
+_SILENT_ASKS = 3
 _DEAF_ALARMS = (1, 2)
 
 
@@ -176,13 +177,14 @@ class GrblSession:
         """Ask until the machine position is known.
 
         A board that reports WPos tells its offset in some reports only: every tenth at
-        rest, every thirtieth in motion.
+        rest, every thirtieth in motion. Three missing answers in a row are a silence.
         """
-        report = self.ask(timeout_s)
+        report, missing = None, 0
         for _ in range(_OFFSET_EVERY):
-            if report is None or self.machine() is not None:
-                break
             report = self.ask(timeout_s)
+            missing = 0 if report else missing + 1
+            if missing == _SILENT_ASKS or (report and self.machine() is not None):
+                break
         return report
 
     def reset(self, *, tries: int = _RESET_TRIES) -> bool:
