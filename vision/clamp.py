@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.jit import njit
 from .curve import Curve
 from .tip import STEP_PX, EndFace, crossings_of, lanes, line_through
 
@@ -87,9 +88,8 @@ def _face(
 ) -> EndFace | None:  # fmt: skip
     across = np.linspace(-0.3, 0.3, _LANES) * width
     light = np.ascontiguousarray(lanes(grey, curve, s, across, sign)[:, ::-1])
-    mean = light.mean(axis=0)
-    place = _steepest(mean, -s[::-1], -expected, reach, 0.12 * contrast)
-    if place is None:
+    place = _steepest(light, -s[::-1], -expected, reach, 0.12 * contrast)
+    if np.isnan(place):
         return None
     crossing = crossings_of(light, -s[::-1], place, near, 3.0, 4.0, reach=4.0)
     line = line_through(across, crossing)
@@ -105,9 +105,8 @@ def _front(
     offsets: list[float] = []
     for across in (-beside[::-1], beside):
         light = lanes(grey, curve, s, across, sign)
-        mean = light.mean(axis=0)
-        place = _steepest(mean, s, expected, reach, 0.15 * contrast)
-        if place is None:
+        place = _steepest(light, s, expected, reach, 0.15 * contrast)
+        if np.isnan(place):
             continue
         crossings.extend(crossings_of(light, s, place, near, 3.0, 4.0, reach=4.0))
         offsets.extend(across)
@@ -116,17 +115,22 @@ def _front(
     return line_through(np.array(offsets), np.array(crossings))
 
 
+@njit(cache=True)
 def _steepest(
-    profile: Array, s: Array, expected: float, reach: float, least: float
-) -> float | None:
-    """Return where a profile rises most over 3 px, if by at least `least`."""
-    lag = round(3.0 / STEP_PX)
-    rise = profile[lag:] - profile[:-lag]
-    centre = 0.5 * (s[lag:] + s[:-lag])
-    rise = np.where(np.abs(centre - expected) <= reach, rise, -np.inf)
-    rise[~np.isfinite(rise)] = -np.inf
-    best = int(np.argmax(rise))
-    return float(centre[best]) if rise[best] > least else None
+    light: Array, s: Array, expected: float, reach: float, least: float
+) -> float:
+    """Return where the mean of lanes rises most over 3 px, if by `least`; else NaN."""
+    lag = int(3.0 / STEP_PX)
+    best, place = least, np.nan
+    for k in range(s.size - lag):
+        centre = 0.5 * (s[k] + s[k + lag])
+        if abs(centre - expected) <= reach:
+            rise = 0.0
+            for i in range(len(light)):
+                rise += (light[i, k + lag] - light[i, k]) / len(light)
+            if rise > best:
+                best, place = rise, centre
+    return place
 
 
 def _turned(line: EndFace) -> EndFace:

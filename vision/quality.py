@@ -9,6 +9,7 @@ import numpy as np
 from .measurement import Measurement
 from .photo import Photo
 from .refine import LostError, Refined
+from .robust import quantile
 from .rod import Candidate
 from .specimen_frame import Setting, root_hidden
 
@@ -64,7 +65,7 @@ def doubts(
         flags.append("root_hidden")
     if photo.clipped > 0.01:
         flags.append("overexposed")
-    if float(np.quantile(refined.shaded[refined.good], 0.9)) > SHADE_PX:
+    if quantile(refined.shaded[refined.good], 0.9) > SHADE_PX:
         flags.append("shadow")
     if refined.good.mean() < 0.8 or refined.fit.noise > 0.02 * result.width_px:
         flags.append("rough_edges")

@@ -72,12 +72,15 @@ class Setting:
 
 @dataclass(frozen=True, slots=True)
 class _Local:
-    """The camera at a point of the rod: px per mm along and across, and per height."""
+    """The camera at points of the rod, shape (n,) each.
 
-    along: float
-    across: float
-    rise_along: float
-    rise_across: float
+    Pixels per mm along and across the rod, and the shift either way per mm of height.
+    """
+
+    along: Array
+    across: Array
+    rise_along: Array
+    rise_across: Array
 
 
 def measurement(
@@ -146,18 +149,12 @@ def _calibrated(
     refined: Refined, setting: Setting, camera: Calibration, curve: Curve
 ) -> Measurement:
     height = setting.rod_height_mm
-    at_root, at_tip = (
-        _local(camera, curve, 0, height),
-        _local(camera, curve, -1, height),
-    )
-    width = refined.width
-    side_mm = float(np.median(width[refined.good])) / (
-        0.5 * (at_root.across + at_tip.across)
-        + 0.5 * (abs(at_root.rise_across) + abs(at_tip.rise_across))
-    )
-    last = refined.tip.s - 0.5 * side_mm * abs(at_tip.rise_along)
-    first = _root(refined, at_root, setting, side_mm)
-    s = np.linspace(first, last, max(int(2.0 * (last - first)), 4 * POINTS))
+    ends = _local(camera, curve.points[[0, -1]], curve.theta[[0, -1]], height)
+    silhouette = ends.across + np.abs(ends.rise_across)
+    side_mm = float(np.median(refined.width[refined.good]) / silhouette.mean())
+    last = refined.tip.s - 0.5 * side_mm * abs(float(ends.rise_along[1]))
+    first = _root(refined, ends, setting, side_mm)
+    s = np.linspace(first, last, 4 * POINTS)
     points, theta = curve.at(s)
     xy = camera.to_mm(points, height_mm=height)
     if not np.all(np.isfinite(xy)):
@@ -174,9 +171,9 @@ def _in_frame(
 ) -> Measurement:  # fmt: skip
     height = setting.rod_height_mm
     tangent = 0.5 * np.column_stack([np.cos(theta), np.sin(theta)])
-    step = camera.to_mm(points + tangent, height_mm=height) - camera.to_mm(
-        points - tangent, height_mm=height
-    )
+    around = np.concatenate([points + tangent, points - tangent])
+    ahead, behind = np.split(camera.to_mm(around, height_mm=height), 2)
+    step = ahead - behind
     stretch = np.hypot(step[:, 0], step[:, 1])
     heading = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
     s_mm = _arc(xy)
@@ -184,7 +181,7 @@ def _in_frame(
         x_mm=float(xy[0, 0]), y_mm=float(xy[0, 1]),
         angle_deg=float(np.degrees(heading[0])), height_mm=height,
     )  # fmt: skip
-    local = pose.from_board(xy)
+    own = pose.from_board(xy)
     grid = refined.fit.curve
     kappa_px = np.interp(s, grid.s, grid.kappa)
     # y runs down in the picture: there the heading turns the other way.
@@ -194,13 +191,14 @@ def _in_frame(
     pixel, angle = grid.at(s_px)
     table = _pixel_columns(refined, s_px, pixel, angle)
     scale = np.interp(even, s_mm, stretch)
-    across, rise = _across(camera, pixel, angle, height)
-    side = SIDE_FACE * np.abs(rise) * table["width_px"] / across
+    local = _local(camera, pixel, angle, height)
+    across = local.across + np.abs(local.rise_across)
+    side = SIDE_FACE * np.abs(local.rise_across) * table["width_px"] / across
     table["sigma_px"] = np.hypot(table["sigma_px"], side)
     table |= {
         "s_mm": even,
-        "x_mm": np.interp(even, s_mm, local[:, 0]),
-        "y_mm": np.interp(even, s_mm, local[:, 1]),
+        "x_mm": np.interp(even, s_mm, own[:, 0]),
+        "y_mm": np.interp(even, s_mm, own[:, 1]),
         "theta_rad": np.interp(even, s_mm, heading - heading[0]),
         "kappa_per_mm": np.interp(even, s_mm, kappa),
         "width_mm": table["width_px"] / across,
@@ -212,7 +210,7 @@ def _in_frame(
         status="ok",
         points=table,
         length_mm=float(s_mm[-1]),
-        tip_mm=(float(local[-1, 0]), float(local[-1, 1])),
+        tip_mm=(float(own[-1, 0]), float(own[-1, 1])),
         tip_angle_deg=float(np.degrees(heading[-1] - heading[0])),
         width_mm=float(np.median(table["width_mm"][table["good"] > 0.5])),
         clamp_angle_sd_deg=_clamp_sd_deg(table),
@@ -230,7 +228,7 @@ def _clamp_sd_deg(table: dict[str, Array]) -> float:
     return float(np.degrees(np.hypot(own, CLAMP_PX / width)))
 
 
-def _root(refined: Refined, local: _Local, setting: Setting, side_mm: float) -> float:
+def _root(refined: Refined, ends: _Local, setting: Setting, side_mm: float) -> float:
     """Return the arc length in px at which the axis leaves the clamp.
 
     The clamp's front plane is seen at the top of the rod (its face) and at the paper
@@ -238,10 +236,10 @@ def _root(refined: Refined, local: _Local, setting: Setting, side_mm: float) -> 
     """
     if refined.clamp is None:
         return 0.0
-    rise = local.rise_along
+    rise = float(ends.rise_along[0])
     face, front = refined.clamp.face, refined.clamp.front
     if rise > 0.0:
-        return _hidden_root(refined, local, setting)
+        return _hidden_root(refined, ends, setting)
     seen_at = []
     if face is not None:
         seen_at.append(face.s - 0.5 * rise * side_mm)
@@ -252,19 +250,18 @@ def _root(refined: Refined, local: _Local, setting: Setting, side_mm: float) -> 
     return float(np.mean(seen_at)) if seen_at else 0.0
 
 
-def _hidden_root(refined: Refined, local: _Local, setting: Setting) -> float:
+def _hidden_root(refined: Refined, ends: _Local, setting: Setting) -> float:
     """Return the root where the clamp's top edge hides it: by height, or by length."""
     lines = refined.clamp
     line = None if lines is None else lines.face or lines.front
     seen = 0.0 if line is None else line.s
+    rise, along = float(ends.rise_along[0]), float(ends.along[0])
     if setting.clamp_height_mm is not None:
-        return seen - local.rise_along * (
-            setting.clamp_height_mm - setting.rod_height_mm
-        )
+        return seen - rise * (setting.clamp_height_mm - setting.rod_height_mm)
     if setting.length_mm is None:
         return seen
-    missing = setting.length_mm * local.along - (refined.tip.s - seen)
-    return seen - float(np.clip(missing, 0.0, 10.0 * local.rise_along))
+    missing = setting.length_mm * along - (refined.tip.s - seen)
+    return seen - float(np.clip(missing, 0.0, 10.0 * rise))
 
 
 def root_hidden(refined: Refined, setting: Setting) -> bool:
@@ -278,39 +275,22 @@ def root_hidden(refined: Refined, setting: Setting) -> bool:
         return False
     if setting.clamp_height_mm is not None or setting.length_mm is not None:
         return False
-    at = _local(camera, refined.fit.curve, 0, setting.rod_height_mm)
-    return at.rise_along * UNKNOWN_CLAMP_MM > HIDDEN_MM * at.along
+    curve = refined.fit.curve
+    at = _local(camera, curve.points[:1], curve.theta[:1], setting.rod_height_mm)
+    return bool(at.rise_along[0] * UNKNOWN_CLAMP_MM > HIDDEN_MM * at.along[0])
 
 
-def _local(camera: Calibration, curve: Curve, index: int, height: float) -> _Local:
-    point = curve.points[index]
-    t, n = curve.tangents[index], curve.normals[index]
-    around = np.array([point - t, point + t, point - n, point + n])
-    mm = camera.to_mm(around, height_mm=height)
-    along = 2.0 / float(np.hypot(*(mm[1] - mm[0])))
-    across = 2.0 / float(np.hypot(*(mm[3] - mm[2])))
-    at = camera.to_mm(point[None], height_mm=height)
-    rise = (
-        camera.to_px(at, height_mm=height + 0.5)
-        - camera.to_px(at, height_mm=height - 0.5)
-    )[0]
-    return _Local(along, across, float(rise @ t), float(rise @ n))
-
-
-def _across(
-    camera: Calibration, points: Array, theta: Array, height: float
-) -> tuple[Array, Array]:
-    """Pixels of silhouette per mm of side, and of side face per mm, shape (n,) each."""
-    normal = np.column_stack([-np.sin(theta), np.cos(theta)])
-    span = camera.to_mm(points + normal, height_mm=height) - camera.to_mm(
-        points - normal, height_mm=height
-    )
-    at = camera.to_mm(points, height_mm=height)
-    rise = camera.to_px(at, height_mm=height + 0.5) - camera.to_px(
-        at, height_mm=height - 0.5
-    )
-    across = np.sum(rise * normal, axis=1)
-    return 2.0 / np.hypot(*span.T) + np.abs(across), across
+def _local(camera: Calibration, points: Array, theta: Array, height: float) -> _Local:
+    t = np.column_stack([np.cos(theta), np.sin(theta)])
+    n = np.column_stack([-t[:, 1], t[:, 0]])
+    around = np.concatenate([points - t, points + t, points - n, points + n, points])
+    mm = camera.to_mm(around, height_mm=height).reshape(5, -1, 2)
+    rise = camera.to_px(mm[4], height_mm=height + 0.5)
+    rise -= camera.to_px(mm[4], height_mm=height - 0.5)
+    return _Local(
+        2.0 / np.hypot(*(mm[1] - mm[0]).T), 2.0 / np.hypot(*(mm[3] - mm[2]).T),
+        np.sum(rise * t, axis=1), np.sum(rise * n, axis=1),
+    )  # fmt: skip
 
 
 def _arc(points: Array) -> Array:
