@@ -151,3 +151,17 @@ def test_help_imports_nothing_heavy() -> None:
     )
     assert done.returncode == 0, done.stderr
     assert "Example: magbend rig run" in done.stdout
+
+
+def test_ctrl_c_at_the_prompt_for_a_reading_stops_the_run(monkeypatch) -> None:
+    import typer
+
+    from magbend.cli.rig_bench import ask_flux
+    from magbend.rig.stage import StoppedError
+
+    def press(*_arguments, **_options) -> None:
+        raise typer.Abort
+
+    monkeypatch.setattr(typer, "prompt", press)
+    with pytest.raises(StoppedError):
+        ask_flux(70.0)

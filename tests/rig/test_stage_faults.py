@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
+from magbend.rig.interrupts import StopAtOnce
 from magbend.rig.stage import (
     AlarmError,
     LinkLostError,
@@ -265,6 +266,27 @@ def test_every_cell_of_the_matrix_is_counted(capsys):
             f"{len(TOLERATED) + 1} that do not"
         )
     assert len(MOVE_FAULTS) >= 10
+
+
+def test_a_second_ctrl_c_resets_and_does_not_slow_down():
+    bench = homed_bench()
+    heard = bytearray()
+    receive = bench.board.receive
+
+    def listen(data: bytes) -> None:
+        heard.extend(data)
+        receive(data)
+
+    def strike() -> None:
+        bench.board.receive = listen
+        raise StopAtOnce
+
+    bench.later(2.0, strike)
+    with pytest.raises(StopAtOnce):
+        bench.stage.goto_gap(60.0)
+    assert b"!" not in heard
+    assert heard.startswith(b"\x18")
+    assert bench.stage.position_state != "homed"
 
 
 UNASKED: dict[str, tuple[Callable[[StageBench], object], type[BaseException]]] = {
