@@ -31,6 +31,9 @@ LEAST_SHARE = 0.2
 _HALVED = 8
 """Bins of log width from one width to half of it."""
 
+_GRAIN = 1.5
+"""Half width under which a thing may be noise."""
+
 _PAD = 40
 """How far things are carried past the border of the picture."""
 
@@ -124,6 +127,10 @@ def _thin_parts(roi: Mask, origin: tuple[int, int], binary: Binary) -> list[Cand
     """Return the thin parts of a thing: of the commonest width, or grown from that."""
     depth = _edge_distance(roi, origin, binary)
     common, thinner = _ridge_half_widths(depth)
+    if 0.0 < common < _GRAIN and depth.max() > 4.0 * _GRAIN:
+        # Grains of noise along the edges of something wide outnumber the rod.
+        smooth = np.asarray(cv2.medianBlur(roi, 3))
+        common, thinner = _ridge_half_widths(_edge_distance(smooth, origin, binary))
     found = _of_width(roi, depth, common, origin, binary) if common else []
     if not thinner:
         return found

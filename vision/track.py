@@ -132,8 +132,8 @@ def _carry_on(
         x, y, u, v = _predict(path[head : head + _RECENT], step)
         beside = 0.5 * width + 4.0
         shade = min(
-            sign * _bilinear(grey, x - beside * v, y + beside * u),
-            sign * _bilinear(grey, x + beside * v, y - beside * u),
+            sign * _streak(grey, x - beside * v, y + beside * u, u, v),
+            sign * _streak(grey, x + beside * v, y - beside * u, u, v),
         )
         here = min(level, dark + SHADED_LEVEL * (shade - dark))
         low, high = _dark_span(grey, x, y, -v, u, beside + 2.0, sign, here)
@@ -156,11 +156,23 @@ def _dark_span(
     low, high = np.nan, np.nan
     for k in range(-count, count + 1):
         t = k * STEP_PX
-        if sign * _bilinear(grey, x + t * u, y + t * v) < level:
+        if sign * _streak(grey, x + t * u, y + t * v, -v, u) < level:
             if np.isnan(low):
                 low = t - 0.5 * STEP_PX
             high = t + 0.5 * STEP_PX
     return low, high
+
+
+@njit(cache=True)
+def _streak(grey: Image, x: float, y: float, u: float, v: float) -> float:
+    """Return the mean of five samples 1.5 px apart along a direction."""
+    total, count = 0.0, 0
+    for k in range(-2, 3):
+        light = _bilinear(grey, x + 1.5 * k * u, y + 1.5 * k * v)
+        if not np.isnan(light):
+            total += light
+            count += 1
+    return total / count if count else np.nan
 
 
 @njit(cache=True)

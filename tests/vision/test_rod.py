@@ -1,0 +1,56 @@
+"""The rod among dark things: by shape alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from magbend.vision.binarise import Binary
+from magbend.vision.rod import find_candidates
+
+
+def things(*boxes: tuple[int, int, int, int]) -> np.ndarray:
+    """A mask of boxes: x, y, width, height."""
+    mask = np.zeros((400, 600), np.uint8)
+    for x, y, width, height in boxes:
+        mask[y : y + height, x : x + width] = 1
+    return mask
+
+
+def candidates(mask: np.ndarray):
+    ratio = np.where(mask, 0.1, 1.0).astype(np.float32)
+    return find_candidates(
+        Binary(
+            ratio=ratio, mask=mask, factor=1, inverted=False, dark=0.1, threshold=0.5
+        )
+    )
+
+
+CLAMP, ROD = (0, 150, 160, 80), (160, 185, 250, 10)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.2, 0.5])
+def test_rod_is_found_beside_a_clamp_with_noise_along_its_edges(share):
+    mask = things(CLAMP, ROD)
+    rng = np.random.default_rng(0)
+    for row in (148, 149, 230, 231):
+        mask[row, :160] |= rng.random(160) < share
+    for row in (183, 184, 195):
+        mask[row, 160:410] |= rng.random(250) < share
+    (rod,) = candidates(mask)
+    assert rod.root == "clamp"
+    assert rod.contacts == 1
+    assert rod.width_px == pytest.approx(10.0, abs=2.0)
+    assert rod.length_px == pytest.approx(250.0, abs=20.0)
+
+
+def test_arm_is_the_clamp_of_the_thinner_thing_that_grows_from_it():
+    (rod,) = candidates(things((0, 180, 420, 40), (420, 196, 120, 5)))
+    assert rod.root == "clamp"
+    assert rod.width_px == pytest.approx(5.0, abs=1.0)
+
+
+def test_bar_alone_is_a_rod_from_the_border():
+    (bar,) = candidates(things((0, 180, 420, 40)))
+    assert bar.root == "border"
+    assert bar.width_px == pytest.approx(40.0, abs=3.0)
