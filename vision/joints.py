@@ -16,9 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.jit import njit
+
 Array = NDArray[np.float64]
 
-_THIN = 4
+_THIN, _MOST_STATIONS, _MOST_PLACES = 4, 150, 75
+"""Stations are averaged by fours, or down to so many on a long rod; joints are looked
+for at so many places. With more, the linear algebra library would wake its threads."""
 _PIECES = 16
 _MOST = 4
 _LEAST_GAIN = 4.0
@@ -70,11 +74,13 @@ def find_joints(
         Arc lengths of the joints, rising; empty for a smooth rod.
     """
     model = _model(s, theta, offset, weights, shared)
-    places = np.arange(s[0] + _ENDS * width, s[-1] - _ENDS * width, 0.25 * width)
+    first, last = s[0] + _ENDS * width, s[-1] - _ENDS * width
+    step = max(0.25 * width, (last - first) / _MOST_PLACES)
+    places = np.arange(first, last, step)
     joints: list[float] = []
     if len(places) < 3:
         return joints
-    choice = 2.0 * np.log(max(0.125 * len(places), 1.0))
+    choice = 2.0 * np.log(max(0.5 * (last - first) / width, 1.0))
     level = -_gains(model, joints, None)[0]
     while len(joints) < _MOST:
         free = _free(places, joints, _APART * width)
@@ -111,12 +117,13 @@ def _model(
     s: Array, theta: Array, offset: Array, weights: Array, shared: float
 ) -> _Model:
     """Thin the stations and set up the smooth part: quadratic plus hinges in theta."""
-    count = len(s) // _THIN * _THIN
-    weight = weights[:count].reshape(-1, _THIN).sum(axis=1)
+    thin = max(_THIN, len(s) // _MOST_STATIONS)
+    count = len(s) // thin * thin
+    weight = weights[:count].reshape(-1, thin).sum(axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        mean = (offset * weights)[:count].reshape(-1, _THIN).sum(axis=1) / weight
-    at = s[:count].reshape(-1, _THIN).mean(axis=1)
-    angle = theta[:count].reshape(-1, _THIN).mean(axis=1)
+        mean = (offset * weights)[:count].reshape(-1, thin).sum(axis=1) / weight
+    at = s[:count].reshape(-1, thin).mean(axis=1)
+    angle = theta[:count].reshape(-1, thin).mean(axis=1)
     normals = np.column_stack([-np.sin(angle), np.cos(angle)])
     length = s[-1] - s[0]
     u = (at - s[0]) / length
@@ -139,12 +146,22 @@ def _model(
     )
 
 
+@njit(cache=True)
 def _moved(angles: Array, s: Array, normals: Array) -> Array:
     """Return the normal displacement that changes of theta (columns) cause."""
+    out = np.empty_like(angles)
+    along = np.zeros((2, angles.shape[1]))
     step = s[1] - s[0]
-    along = np.cumsum(angles[:, :, None] * normals[:, None, :] * step, axis=0)
-    along -= 0.5 * step * angles[:, :, None] * normals[:, None, :]
-    return np.asarray(np.einsum("nkd,nd->nk", along, normals))
+    for i in range(s.size):
+        u, v = normals[i]
+        for k in range(angles.shape[1]):
+            half = 0.5 * step * angles[i, k]
+            along[0, k] += half * u
+            along[1, k] += half * v
+            out[i, k] = along[0, k] * u + along[1, k] * v
+            along[0, k] += half * u
+            along[1, k] += half * v
+    return out
 
 
 def _jumps(model: _Model, places: Array) -> Array:
