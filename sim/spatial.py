@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,11 +32,11 @@ from .fields import (
     Support,
     UniformField,
 )
-from .magnet_field import BLOCK_SIZE, inside
+from .magnet_field import BLOCK_SIZE
 from .scaling import field_array, stations
 from .spatial_march import AXIAL, C1, C3, K1, K3, MU1, WX, WZ, H, flux_at
 from .spatial_rod import SpatialRod, SpatialSection, Vector, rod_table
-from .spatial_solve import shape, solve_pose
+from .spatial_solve import shape, solve_pose, touches
 
 __all__ = ["SpatialRod", "SpatialSection", "SpatialSolution", "solve_spatial"]
 
@@ -161,16 +162,14 @@ def solve_spatial(
     [29.53532, 4.70952, 0.0]
     """
     support = support or Support()
-    if isinstance(rod, Specimen):
-        rod = SpatialRod.from_specimen(rod)
+    rod, table, margin = _held(rod, support)
     L = rod.length_mm
     flux = _flux_array(field, L)
-    table = rod_table(rod, support)
     angle = rad_from_deg(support.clamp_angle_deg)
     cos, sin = math.cos(angle), math.sin(angle)
     clamp = np.array([[-sin, 0.0, cos], [cos, 0.0, sin], [0.0, 1.0, 0.0]])
     s = stations(points)
-    if _touches(flux, np.outer(s, clamp[:, 2]), _margin(rod)):
+    if flux[0] != 0.0 and touches(flux, np.outer(s, clamp[:, 2]), margin):
         raise InputError(
             "gap_mm must leave the undeformed rod clear of the magnet, with half its "
             f"side to spare; instead received {getattr(field, 'gap_mm', math.nan):g} mm"
@@ -182,9 +181,20 @@ def solve_spatial(
         return _gone(flux, L, load, clamp[:, 2])
     states = np.empty((points, 18))
     shape(table, flux, 2 * n, R, r, s, states)
-    if _touches(flux, states[:, 12:15], _margin(rod)):
+    if touches(flux, states[:, 12:15], margin):
         return _gone(flux, L, load, states[-1, 12:15])
     return _solution(rod, table, flux, s, states, index, error)
+
+
+@lru_cache(maxsize=256)
+def _held(
+    rod: SpatialRod | Specimen, support: Support
+) -> tuple[SpatialRod, Array, float]:
+    """Return the rod, its table for the kernels, and half its side over its length."""
+    if isinstance(rod, Specimen):
+        rod = SpatialRod.from_specimen(rod)
+    sides = [min(part.width_mm, part.height_mm) for part in rod.sections]
+    return rod, rod_table(rod, support), 0.5 * max(sides) / rod.length_mm
 
 
 def _flux_array(field: Field | Sequence[float], length_mm: float) -> Array:
@@ -218,17 +228,6 @@ def _steps(table: Array, flux: Array, tip: Array) -> float:
         )
     turns = float(np.linalg.norm(table[:, K1 : K3 + 1], axis=1) @ table[:, H])
     return 5.0 + 9.0 * reach + 4.0 * turns
-
-
-def _margin(rod: SpatialRod) -> float:
-    sides = [min(part.width_mm, part.height_mm) for part in rod.sections]
-    return 0.5 * max(sides) / rod.length_mm
-
-
-def _touches(flux: Array, points: Array, margin: float) -> bool:
-    return flux[0] != 0.0 and any(
-        inside(flux[1:], x, y, z, margin) for x, y, z in points
-    )
 
 
 def _gone(flux: Array, length_mm: float, load: float, tip: Array) -> SpatialSolution:

@@ -14,9 +14,10 @@ magnetisation is in n as a pole load, exactly (`planar_march`); `mu` is the tran
 part only, with distributed torque and force.
 
 A column, shape (12,), holds (chi, dm, dr, dn): dR = R chi^, and the variations of m, r
-and n. Six of them, for a turn and a shift of the tip, give Newton's matrix.
+and n. Six of them, for a turn and a shift of the tip, give Newton's matrix; in a
+uniform field three, for the turn.
 
-A section is a row of 17 numbers, named below. One step of the sixth-order method of
+A section is a row of 13 numbers, named below. One step of the sixth-order method of
 Butcher (J. Austral. Math. Soc. 4, 179, 1964) has seven stages.
 """
 
@@ -209,9 +210,10 @@ def begin(rod, field, load, R, r, y, Z, b):  # type: ignore[no-untyped-def]
         Z[:] = 0.0
         for a in range(3):
             Z[a, a] = 1.0
-            Z[6 + a, 3 + a] = 1.0
-            for i in range(3):
-                Z[9 + i, 3 + a] = m * b[3 + 3 * i + a]
+            if Z.shape[1] > 3:
+                Z[6 + a, 3 + a] = 1.0
+                for i in range(3):
+                    Z[9 + i, 3 + a] = m * b[3 + 3 * i + a]
 
 
 @njit(cache=True)

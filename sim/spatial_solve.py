@@ -1,10 +1,6 @@
-"""Equilibria of the rod in space: Newton on the tip's pose, load continuation, index.
+"""Equilibria of the rod in space: Newton on the tip's pose, load continuation.
 
-Dimensionless as `spatial_march`. The Morse index counts the focal points of the march:
-over a step from the columns (X_0, Y_0) to X_1, with B the response of X_1 to Y alone,
-it is the number of negative eigenvalues of the symmetric matrix X_0 X_1^-1 B (Kratz,
-Quadratic Functionals in Variational Analysis and Control Theory, 1995). Unlike the sign
-of det X it counts the double zeros of rods that may buckle in any direction.
+Dimensionless as `spatial_march`.
 """
 
 from __future__ import annotations
@@ -15,6 +11,7 @@ import numpy as np
 
 from ..core.jit import njit
 from .magnet_field import inside
+from .spatial_index import matrix, morse_index, solve6, unknowns
 from .spatial_march import (
     COLUMN,
     STATE,
@@ -23,95 +20,18 @@ from .spatial_march import (
     loaded,
     march,
     step,
-    steps_of,
     workspace,
 )  # fmt: skip
 
-CONVERGED = 1e-11
+CONVERGED = 1e-9
+"""Correction after which the next, by the matrix kept, is rounding."""
+NEAR = 1e-4
+"""Correction after which the coarse steps have done their part."""
+COARSE = 0.5
+"""Share of the steps that brings Newton near, and is enough for its matrix."""
 CHORD = 1e-2
+"""Correction after which the matrix is kept."""
 MIN_LOAD_STEP = 1e-6
-
-
-@njit(cache=True)
-def solve6(A, x):  # type: ignore[no-untyped-def]
-    """Solve A x = x in place, by elimination with row pivots; False if singular."""
-    n = A.shape[0]
-    for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if abs(A[i, k]) > abs(A[best, k]):
-                best = i
-        if A[best, k] == 0.0 or not math.isfinite(A[best, k]):
-            return False
-        if best != k:
-            for j in range(n):
-                A[k, j], A[best, j] = A[best, j], A[k, j]
-            for j in range(x.shape[1]):
-                x[k, j], x[best, j] = x[best, j], x[k, j]
-        for i in range(k + 1, n):
-            f = A[i, k] / A[k, k]
-            if f != 0.0:
-                for j in range(k + 1, n):
-                    A[i, j] -= f * A[k, j]
-                for j in range(x.shape[1]):
-                    x[i, j] -= f * x[k, j]
-    for j in range(x.shape[1]):
-        for k in range(n - 1, -1, -1):
-            v = x[k, j]
-            for i in range(k + 1, n):
-                v -= A[k, i] * x[i, j]
-            x[k, j] = v / A[k, k]
-    return True
-
-
-@njit(cache=True)
-def negatives(S):  # type: ignore[no-untyped-def]
-    """Count the negative eigenvalues of a symmetric matrix (destroyed), zeros apart.
-
-    Elimination with the largest diagonal pivot, or a 2 x 2 block (one negative and one
-    positive) where an element off the diagonal is far larger.
-    """
-    n = S.shape[0]
-    tiny = 1e-10 * np.max(np.abs(S))
-    count = 0
-    alive = np.ones(n, dtype=np.bool_)
-    for _ in range(n):
-        d = p = q = -1
-        for i in range(n):
-            if not alive[i]:
-                continue
-            if d < 0 or abs(S[i, i]) > abs(S[d, d]):
-                d = i
-            for j in range(i):
-                if alive[j] and (p < 0 or abs(S[i, j]) > abs(S[p, q])):
-                    p, q = i, j
-        if d < 0:
-            break
-        if p < 0 or abs(S[d, d]) >= 0.6 * abs(S[p, q]):
-            if abs(S[d, d]) <= tiny:
-                break
-            count += S[d, d] < 0.0
-            alive[d] = False
-            for i in range(n):
-                if alive[i]:
-                    f = S[i, d] / S[d, d]
-                    for j in range(n):
-                        if alive[j]:
-                            S[i, j] -= f * S[d, j]
-            continue
-        if abs(S[p, q]) <= tiny:
-            break
-        count += 1
-        alive[p] = alive[q] = False
-        det = S[p, p] * S[q, q] - S[p, q] ** 2
-        for i in range(n):
-            if alive[i]:
-                f = (S[i, p] * S[q, q] - S[i, q] * S[p, q]) / det
-                g = (S[i, q] * S[p, p] - S[i, p] * S[p, q]) / det
-                for j in range(n):
-                    if alive[j]:
-                        S[i, j] -= f * S[p, j] + g * S[q, j]
-    return count
 
 
 @njit(cache=True)
@@ -128,15 +48,6 @@ def _miss(y, Rc, x):  # type: ignore[no-untyped-def]
     for i in range(3):
         x[3 + i, 0] = -y[12 + i]
     return M[0, 0] + M[1, 1] + M[2, 2]
-
-
-@njit(cache=True)
-def _matrix(Z, A):  # type: ignore[no-untyped-def]
-    """Copy turn and shift at the root by the six unknowns into `A`."""
-    for a in range(6):
-        for i in range(3):
-            A[i, a] = Z[i, a]
-            A[3 + i, a] = Z[6 + i, a]
 
 
 @njit(cache=True)
@@ -160,44 +71,50 @@ def _move(R, r, x):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def newton(rod, field, load, n, Rc, R, r, first, y, Z, none, work, bare):  # type: ignore[no-untyped-def]
-    """Iterate the tip's pose (R, r); False if the corrections do not contract."""
-    A, J, x = np.zeros((6, 6)), np.zeros((6, 6)), np.zeros((6, 1))
+def newton(rod, field, load, n, Rc, R, r, first, y, Z, J, none, work, bare):  # type: ignore[no-untyped-def]
+    """Iterate the tip's pose (R, r); False if the corrections do not contract.
+
+    Coarse steps bring it near and give the matrix, which stays in `J`; then n steps.
+    """
+    A, x = np.zeros((6, 6)), np.zeros((6, 1))
     before = math.inf
+    fine = False
     for k in range(24):
         if field[0] != 0.0 and inside(field[1:], r[0], r[1], r[2], 0.0):
             return False
+        steps = n if fine else COARSE * n
         if before > CHORD:
-            march(rod, field, load, n, R, r, y, Z, work)
-            _matrix(Z, J)
+            march(rod, field, load, steps, R, r, y, Z, work)
+            matrix(Z, J)
         else:
-            march(rod, field, load, n, R, r, y, none, bare)
+            march(rod, field, load, steps, R, r, y, none, bare)
         trace = _miss(y, Rc, x)
         A[:] = J
         if trace < 1.0 or not solve6(A, x):
             return False
         size = _move(R, r, x)
-        if not size < CONVERGED and (
-            not size < first or (k > 0 and size > 0.25 * before)
-        ):
+        if not size < first or (k > 0 and size > max(0.25 * before, CONVERGED)):
             return False
-        if size < CONVERGED:
+        if fine and size < CONVERGED:
             return True
         before = size
+        if not fine and size < NEAR:
+            fine = True
+            before = CHORD
     return False
 
 
 @njit(cache=True)
-def follow(rod, field, n, Rc, R, r, y, Z, none, work, bare):  # type: ignore[no-untyped-def]
+def follow(rod, field, n, Rc, R, r, y, Z, J, none, work, bare):  # type: ignore[no-untyped-def]
     """Follow the equilibrium from no load to full load; return the load reached."""
     Rb, rb = R.copy(), r.copy()
     load, jump = 0.0, 0.125
-    if not newton(rod, field, 0.0, n, Rc, R, r, 4.0, y, Z, none, work, bare):
+    if not newton(rod, field, 0.0, n, Rc, R, r, 4.0, y, Z, J, none, work, bare):
         return 0.0
     while load < 1.0:
         jump = min(jump, 1.0 - load)
         Rb[:], rb[:] = R, r
-        if newton(rod, field, load + jump, n, Rc, R, r, 0.4, y, Z, none, work, bare):
+        if newton(rod, field, load + jump, n, Rc, R, r, 0.4, y, Z, J, none, work, bare):
             load = 1.0 if jump == 1.0 - load else load + jump
             jump *= 2.0
             continue
@@ -209,47 +126,6 @@ def follow(rod, field, n, Rc, R, r, y, Z, none, work, bare):  # type: ignore[no-
 
 
 @njit(cache=True)
-def morse_index(rod, field, n, R, r):  # type: ignore[no-untyped-def]
-    """Count the focal points between tip and root: the unstable directions."""
-    y, Z = np.zeros(STATE), np.zeros((COLUMN, 12))
-    K, KZ, ys, Zs, b, b2, p = workspace(12)
-    begin(rod, field, 1.0, R, r, y, Z, b)
-    X0, X1 = np.zeros((6, 6)), np.zeros((6, 6))
-    B, S = np.zeros((6, 6)), np.zeros((6, 6))
-    index = 0
-    for i in range(rod.shape[0]):
-        loaded(rod, i, 1.0, p)
-        count = steps_of(rod, i, n)
-        h = rod[i, 0] / count
-        for _ in range(count):
-            _matrix(Z, X0)
-            Z[:, 6:] = 0.0
-            for a in range(3):
-                Z[3 + a, 6 + a] = -1.0
-                Z[9 + a, 9 + a] = -1.0
-            step(h, p, field, y, Z, K, KZ, ys, Zs, b, b2)
-            _matrix(Z, X1)
-            for a in range(6):
-                for c in range(3):
-                    B[c, a] = Z[c, 6 + a]
-                    B[3 + c, a] = Z[6 + c, 6 + a]
-            if not solve6(X1, B):
-                return -1
-            S[:] = 0.0
-            for a in range(6):
-                for c in range(6):
-                    for k in range(6):
-                        S[a, c] += X0[a, k] * B[k, c]
-            for a in range(6):
-                for c in range(a):
-                    S[a, c] = S[c, a] = 0.5 * (S[a, c] + S[c, a])
-            index += negatives(S)
-        if i + 1 < rod.shape[0]:
-            cross(rod, field, 1.0, i, y, Z[:, :6], b)
-    return index
-
-
-@njit(cache=True)
 def solve_pose(rod, field, n, Rc, R, r):  # type: ignore[no-untyped-def]
     """Find the tip's pose (R, r) at full load, from the one given or from no load.
 
@@ -258,26 +134,36 @@ def solve_pose(rod, field, n, Rc, R, r):  # type: ignore[no-untyped-def]
     tuple
         Morse index (-1: no equilibrium), load reached, error (dimensionless).
     """
-    y, Z, none = np.zeros(STATE), np.zeros((COLUMN, 6)), np.zeros((COLUMN, 0))
-    work, bare = workspace(6), workspace(0)
+    columns = unknowns(field)
+    y, Z, none = np.zeros(STATE), np.zeros((COLUMN, columns)), np.zeros((COLUMN, 0))
+    work, bare = workspace(columns), workspace(0)
+    J, x = np.zeros((6, 6)), np.zeros((6, 1))
     R0, r0 = R.copy(), r.copy()
     index = -1
-    if newton(rod, field, 1.0, n, Rc, R, r, 1.0, y, Z, none, work, bare):
-        index = morse_index(rod, field, n, R, r)
+    if newton(rod, field, 1.0, n, Rc, R, r, 1.0, y, Z, J, none, work, bare):
+        index = morse_index(rod, field, COARSE * n, R, r)
     if index != 0:
         R[:], r[:] = R0, r0
-        load = follow(rod, field, n, Rc, R, r, y, Z, none, work, bare)
+        load = follow(rod, field, n, Rc, R, r, y, Z, J, none, work, bare)
         if load < 1.0:
             return -1, load, 0.0
-        index = morse_index(rod, field, n, R, r)
-    march(rod, field, 1.0, n, R, r, y, Z, work)
-    A, x = np.zeros((6, 6)), np.zeros((6, 1))
-    _matrix(Z, A)
-    march(rod, field, 1.0, 2 * n, R, r, y, none, bare)
+        index = morse_index(rod, field, COARSE * n, R, r)
+    march(rod, field, 1.0, 2.0 * n, R, r, y, none, bare)
     _miss(y, Rc, x)
     error = np.sum(np.abs(x))
-    solve6(A, x)
+    solve6(J, x)
     return index, 1.0, error + _move(R, r, x) + 1e-15 * n
+
+
+@njit(cache=True)
+def touches(field, points, margin):  # type: ignore[no-untyped-def]
+    """Tell whether any of the points (n, 3) is within `margin` of the magnet."""
+    if field[0] == 0.0:
+        return False
+    for k in range(points.shape[0]):
+        if inside(field[1:], points[k, 0], points[k, 1], points[k, 2], margin):
+            return True
+    return False
 
 
 @njit(cache=True)

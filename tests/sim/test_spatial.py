@@ -18,9 +18,12 @@ from magbend.core.magnet import Magnet
 from magbend.core.units import GRAVITY_M_PER_S2, MU0
 from magbend.sim import MagnetField, Support, UniformField, gmc
 from magbend.sim.magnet_field import magnet_flux_mT, magnet_gradient_mT_per_mm
+from magbend.sim.scaling import field_array
 from magbend.sim.solve import solve
 from magbend.sim.spatial import SpatialRod, SpatialSection, solve_spatial
-from magbend.sim.spatial_rod import torsion_constant_mm4
+from magbend.sim.spatial_index import morse_index
+from magbend.sim.spatial_march import AXIAL, MU1, MU2, flux_at
+from magbend.sim.spatial_rod import rod_table, torsion_constant_mm4
 
 SIM = Path(__file__).parents[2] / "fixtures" / "sim"
 CUBE = Magnet.cube(55.0, 1.305)
@@ -268,3 +271,39 @@ def test_bad_input_is_refused() -> None:
         solve_spatial(SpatialRod(sections=(
             section(length_mm=1000.0, E_MPa=0.01, remanence_mT=(0.0, 0.0, 100.0)),
         )), (0.0, 1000.0, 0.0))  # fmt: skip
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    load=st.floats(0.5, 15.0),
+    thin=st.floats(0.4, 1.0),
+)
+def test_index_in_a_uniform_field_is_that_of_six_unknowns(seed, load, thin) -> None:
+    """A magnet so far away that its field is uniform takes the general road."""
+    rng = np.random.default_rng(seed)
+    rod = SpatialRod(
+        sections=tuple(
+            section(E_MPa=E, height_mm=thin, remanence_mT=tuple(rng.normal(size=3)))
+            for E in (20.0, 15.0, 10.0)
+        )
+    )
+    table = rod_table(rod, Support())
+    table[:, [AXIAL, MU1, MU2]] *= load / np.abs(table[:, AXIAL : MU2 + 1]).max()
+    cube = Magnet.cube(100.0, 1.0)
+    block = field_array(MagnetField(magnet=cube, gap_mm=1e6), 30.0).copy()
+    b = np.zeros(12)
+    flux_at(block, 1.0, 0.0, 0.0, b)
+    strength = np.linalg.norm(b[:3])
+    block[-1] = 1.0 / strength
+    uniform = np.zeros_like(block)
+    uniform[1:4] = b[:3] / strength
+    pose, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    pose *= np.linalg.det(pose)
+    pose = np.ascontiguousarray(pose)
+    tip = np.array([1.0, 0.0, 0.0])
+    index = morse_index(table, uniform, 60.0, pose, tip)
+    assert index == morse_index(table, block, 60.0, pose, tip)
+    near = field_array(MagnetField(magnet=cube, gap_mm=60.0), 30.0)
+    index = morse_index(table, near, 60.0, pose, tip)
+    assert index == morse_index(table, near, 240.0, pose, tip)
