@@ -142,12 +142,23 @@ def _end_section(rows, X, D):  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
+def _integrate(h, order, C):  # type: ignore[no-untyped-def]
+    """Turn the products with cos and sin into series of the positions, over tau / h."""
+    for n in range(C.shape[0]):
+        for k in range(order):
+            f = h / (k + 1)
+            for a in range(4):
+                C[n, k, 2, a] *= f
+                C[n, k, 3, a] *= f
+
+
+@njit(**PART)
 def _station_columns(r, h, order, before, grow, T, C, out):  # type: ignore[no-untyped-def]
     """Evaluate the columns at the fraction `r` of a step of length `h`.
 
-    `before` holds their positions where the step begins. `grow` holds how far the
-    station slides along the section, as its distance from the clamp is kept while
-    lengths change.
+    `before` holds their positions where the step begins, and the products in C are
+    integrated (`_integrate`). `grow` holds how far the station slides along the
+    section, as its distance from the clamp is kept while lengths change.
     """
     slope = sine = cosine = 0.0
     for k in range(order - 1, -1, -1):
@@ -159,14 +170,13 @@ def _station_columns(r, h, order, before, grow, T, C, out):  # type: ignore[no-u
             theta = C[n, order, 0, a]
             x = y = 0.0
             for k in range(order - 1, -1, -1):
-                f = 1.0 / (k + 1)
                 theta = theta * r + C[n, k, 0, a]
-                x = x * r + C[n, k, 3, a] * f
-                y = y * r + C[n, k, 2, a] * f
+                x = x * r + C[n, k, 3, a]
+                y = y * r + C[n, k, 2, a]
             c = 4 * n + a
             out[0, c] = theta + grow[n, a] * slope / h
-            out[1, c] = before[n, 0, a] - h * r * x - grow[n, a] * cosine
-            out[2, c] = before[n, 1, a] - h * r * y - grow[n, a] * sine
+            out[1, c] = before[n, 0, a] - r * x - grow[n, a] * cosine
+            out[2, c] = before[n, 1, a] - r * y - grow[n, a] * sine
 
 
 @njit(**PART)
@@ -257,6 +267,7 @@ def _columns(rod, field, u, rods, changes, clamps, s, order, step, out):  # type
                     before[n, 0, a] = D[n, 2, a]
                     before[n, 1, a] = D[n, 3, a]
                 column_step(h, order, X, T, D[n], C[n])
+            _integrate(h, order, C)
             last = i + 1 == rod.shape[0] and j + 1 == count
             while k >= 0 and (last or 1.0 - s[k] <= reached + h + 1e-13):
                 r = (1.0 - s[k] - reached) / h
