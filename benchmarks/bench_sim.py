@@ -18,7 +18,14 @@ from scipy.integrate import solve_bvp
 
 from magbend.core.magnet import Magnet
 from magbend.core.units import MU0
-from magbend.sim import MagnetField, UniformField, gmc, solve, solve_many
+from magbend.sim import (
+    MagnetField,
+    UniformField,
+    gmc,
+    sensitivities,
+    solve,
+    solve_many,
+)
 
 COMMANDS = (
     "--help",
@@ -95,6 +102,20 @@ def single_calls() -> float:
     )
     print(f"solve, cube magnet           {cube * 1e6:8.1f} us")
     return uniform
+
+
+def derivatives() -> None:
+    """Sensitivities of every point's x, y and angle, in units of one solve."""
+    rod, magnet = gmc(2), MagnetField(magnet=CUBE, gap_mm=60.0)
+    base = cost(lambda: solve(rod, magnet), 300)
+    names = [f"{kind}[{i}]" for kind in ("E_MPa", "length_mm") for i in range(3)]
+    names += ["side_mm", "remanence_mT", "gap_mm", "magnet.remanence_T"]
+    for few in (names[:1], names):
+        one = cost(lambda p=few: sensitivities(rod, magnet, parameters=p), 100)
+        print(
+            f"sensitivities, {len(few):2d} of them     {one * 1e6:8.1f} us   "
+            f"{one / base:.1f} solves, {one / base / len(few):.1f} a parameter"
+        )
 
 
 def batches(n: int = 100_000) -> None:
@@ -190,6 +211,7 @@ def main() -> None:
         f"scipy solve_bvp, tol 1e-6    {theirs * 1e6:8.1f} us   error {error:.1e} mm"
         f"   ratio {theirs / ours:.0f}"
     )
+    derivatives()
     batches()
     start_up()
     if "--elastica" in sys.argv:

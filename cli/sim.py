@@ -151,6 +151,7 @@ def _summary(rod: Specimen, model: str, solution: Solution) -> dict[str, Any]:
         "model": model,
         "status": solution.status,
         "morse_index": solution.morse_index,
+        "stable_in_space": solution.stable_in_space,
         "load_limit": solution.load_limit,
     }
     line = solution.centreline
@@ -201,6 +202,8 @@ def _print(data: dict[str, Any]) -> None:
         typer.echo(f"  tip angle    {data['tip_angle_deg']:.5f} deg")
         typer.echo(f"  root moment  {data['root_moment_Nm']:.6g} N m")
         typer.echo(f"  Morse index  {data['morse_index']}")
+        if data["status"] == "stable" and data["stable_in_space"] is False:
+            typer.echo("  in space     unstable: left free, it swings out of the plane")
         typer.echo(f"  error        below {data['error_mm']:.1e} mm")
     elif data["load_limit"] < 1.0:
         typer.echo(f"  branch ends  at {data['load_limit']:.4g} of the load")

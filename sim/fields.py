@@ -157,6 +157,9 @@ class Solution:
     load_limit : float
         Fraction of the load up to which the rod has an equilibrium continuously
         connected to the unloaded rod: 1 where the full load is reached.
+    stable_in_space : bool or None
+        Whether the equilibrium also holds against leaving the plane; None where that
+        was not looked at (solid model) or there is no equilibrium.
     """
 
     centreline: Centreline | None
@@ -166,3 +169,4 @@ class Solution:
     flux_tip_mT: tuple[float, float]
     root_moment_Nm: float
     load_limit: float = 1.0
+    stable_in_space: bool | None = None

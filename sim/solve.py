@@ -22,6 +22,7 @@ from .fields import (
     UniformField,
 )
 from .planar import GONE, ORDER, STEP, TOO_STRONG, TOUCHES, solve_planar
+from .planar_swing import swing_index
 from .scaling import field_array, rod_array, stations, stiffness_Nmm2
 
 Array = NDArray[np.float64]
@@ -92,9 +93,10 @@ def solve(
         return spatial.seen_from_above()
     rod, length_mm, margin, unit_Nm = _held(specimen, support)
     s = stations(points)
-    outcome, index, load, error, bx, by, moment, table, _ = solve_planar(
+    flux = field_array(field, length_mm)
+    outcome, index, load, error, bx, by, moment, table, tip = solve_planar(
         rod,
-        field_array(field, length_mm),
+        flux,
         rad_from_deg(support.clamp_angle_deg),
         margin,
         s,
@@ -103,12 +105,13 @@ def solve(
     )
     if outcome > GONE:
         raise failure(outcome, specimen, field, load)
-    centreline = None
+    centreline = stable_in_space = None
     if outcome != GONE:
         x, y, theta, kappa = table
         centreline = Centreline._trusted(
             s * length_mm, x * length_mm, y * length_mm, theta, kappa / length_mm
         )
+        stable_in_space = index == 0 and swing_index(rod, flux, tip, STEP) == 0
     return Solution(
         centreline=centreline,
         status=STATUS[outcome],
@@ -117,6 +120,7 @@ def solve(
         flux_tip_mT=(mT_from_T(bx), mT_from_T(by)),
         root_moment_Nm=moment * unit_Nm,
         load_limit=load,
+        stable_in_space=stable_in_space,
     )
 
 

@@ -111,6 +111,7 @@ class SpatialSolution:
             centreline=centreline, status=self.status, morse_index=self.morse_index,
             error_mm=self.error_mm, flux_tip_mT=self.flux_tip_mT[:2],
             root_moment_Nm=self.root_moment_Nm[2], load_limit=self.load_limit,
+            stable_in_space=self.morse_index == 0 if centreline else None,
         )  # fmt: skip
 
     def _turn(self) -> Array:

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from magbend.core.errors import InputError, SolverError
 from magbend.core.magnet import Magnet
 from magbend.core.specimen import Section, Specimen
+from magbend.core.units import MU0
 from magbend.sim import (
     PULLED_IN,
     MagnetField,
@@ -27,7 +28,9 @@ from magbend.sim import (
 from magbend.sim.check import check_solve
 from magbend.sim.fields import Field
 from magbend.sim.planar import GONE, OK_STABLE, follow_load, solve_planar
+from magbend.sim.planar_swing import swing_index
 from magbend.sim.scaling import field_array, rod_array, stations
+from magbend.sim.spatial import solve_spatial
 
 
 def signed(low: float, high: float) -> st.SearchStrategy[float]:
@@ -198,6 +201,50 @@ def test_a_straight_rod_unstable_under_full_load_does_not_jump() -> None:
         assert line is not None
         tips.append(line.tip_mm)
     assert np.hypot(*np.diff(tips, axis=0).T).max() < 0.2
+
+
+def test_directions_in_and_out_of_the_plane_are_those_in_space() -> None:
+    """The spatial solver counts all directions, by its own march of 6 columns."""
+    counts = []
+    for rod, field in near_magnets(150):
+        row, array = rod_array(rod, Support()), field_array(field, rod.length_mm)
+        found = solve_planar(
+            row, array, 0.0, 0.5 / rod.length_mm, stations(61), 16, 0.3
+        )
+        if found[0] >= GONE:
+            continue
+        space = solve_spatial(rod, field)
+        tip = found[7][:2, -1] * rod.length_mm
+        if len(space.s_mm) and np.abs(space.r_mm[-1] - [*tip, 0.0]).max() < 1e-4:
+            swings = swing_index(row, array, found[8], 0.3)
+            assert found[1] + swings == space.morse_index
+            counts.append(swings)
+    assert len(counts) > 50
+    assert max(counts) == 1
+
+
+def test_a_straight_rod_is_as_stable_in_every_direction() -> None:
+    # Euler's loads at (2 n - 1)^2 pi^2 / 4, against a uniform field.
+    sections = (Section(length_mm=15.0, E_MPa=10.0),) * 2
+    for load, index in ((2.4, 0), (2.5, 1), (22.1, 1), (22.3, 2)):
+        EI_Nm2 = 10e6 * 1e-12 / 12.0
+        remanence_mT = load * EI_Nm2 / 0.03**2 / 0.1 * MU0 / 1e-6 * 1e3
+        rod = Specimen(
+            name="Euler", side_mm=1.0, remanence_mT=remanence_mT, sections=sections
+        )
+        field = UniformField(flux_mT=100.0, angle_deg=180.0)
+        row, array = rod_array(rod, Support()), field_array(field, 30.0)
+        tip = solve_planar(row, array, 0.0, 0.01, stations(2), 16, 0.3)[8]
+        assert swing_index(row, array, tip, 0.3) == index
+
+
+def test_a_rod_drawn_round_a_magnet_is_stable_in_the_plane_only() -> None:
+    flags = [
+        solution.stable_in_space
+        for rod, field in near_magnets(150)
+        if (solution := attempt(rod, field, Support())) and solution.centreline
+    ]
+    assert {True, False} == set(flags)
 
 
 def plain_rod(E_MPa: float) -> Specimen:
