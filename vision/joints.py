@@ -20,7 +20,7 @@ from ..core.jit import njit
 
 Array = NDArray[np.float64]
 
-_THIN, _MOST_STATIONS, _MOST_PLACES = 4, 150, 75
+_THIN, _MOST_STATIONS, _MOST_PLACES = 4, 200, 55
 """Stations are averaged by fours, or down to so many on a long rod; joints are looked
 for at so many places. With more, the linear algebra library would wake its threads."""
 _PIECES = 16
@@ -161,7 +161,7 @@ def _moved(angles: Array, s: Array, normals: Array) -> Array:
             out[i, k] = along[0, k] * u + along[1, k] * v
             along[0, k] += half * u
             along[1, k] += half * v
-    return out
+    return np.asarray(out)
 
 
 def _jumps(model: _Model, places: Array) -> Array:
