@@ -280,9 +280,9 @@ def _told_how_to_go_on(stage: GapStage) -> Iterator[None]:
             with received.striking():
                 yield
         except (KeyboardInterrupt, StoppedError) as stop:
-            by = "Ctrl-C" if received.name == "SIGINT" else received.name
             kept = stage.position_state == "homed"
             what = "the position was kept" if kept else "home it (magbend rig home)"
+            by = received.name
             raise RigError(f"stopped by {by}; {what}" if by else str(stop)) from None
 
 

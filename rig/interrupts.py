@@ -29,7 +29,7 @@ class Interrupts:
     Attributes
     ----------
     name : str
-        The first signal that came, such as ``SIGINT``; empty before.
+        The first that came: ``Ctrl-C``, ``SIGTERM`` or ``SIGHUP``; empty before.
     """
 
     def __init__(self, ask: Callable[[], None]) -> None:
@@ -55,7 +55,8 @@ class Interrupts:
             return
         self._last_s = now_s
         if not self.name:
-            self.name = signal.Signals(number).name
+            is_key = number == signal.SIGINT
+            self.name = "Ctrl-C" if is_key else signal.Signals(number).name
             self._ask()
         elif self._may_strike:
             self._may_strike = False

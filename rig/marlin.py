@@ -27,6 +27,7 @@ from .stage import (
 from .stage_config import StageConfig
 
 _HOME_S = 120.0
+_PIECE_S = 0.75
 
 
 class MarlinStage(SerialStage[MarlinSession]):
@@ -185,6 +186,10 @@ class MarlinStage(SerialStage[MarlinSession]):
             )
         self._trust.stands(session)
         moved(target_mm)
+
+    def _longest_piece_mm(self, feed_mm_min: float) -> float:
+        # A piece cannot be cut short: a stop must wait for its end.
+        return min(self._config.piece_mm, feed_mm_min / 60.0 * _PIECE_S)
 
     def _note(self, session: MarlinSession) -> None:
         self._trust.note(session)

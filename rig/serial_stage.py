@@ -269,12 +269,17 @@ class SerialStage(ABC, Generic[Session]):
         distance = machine_mm - here
         if abs(distance) <= self.limits.step_mm / 2.0:
             return
-        pieces = math.ceil(abs(distance) / self._config.piece_mm)
+        pieces = math.ceil(abs(distance) / self._longest_piece_mm(feed_mm_min))
         with self._stand_if_interrupted():
             for piece in range(1, pieces + 1):
                 self._hold_if_asked()
                 target = here + distance * piece / pieces
                 self._move_piece(target, feed_mm_min, moved)
+
+    def _longest_piece_mm(self, feed_mm_min: float) -> float:
+        """Return how far one motion may go, in mm."""
+        del feed_mm_min
+        return self._config.piece_mm
 
     def _check_travel(self, machine_mm: float) -> None:
         travel = self.limits.travel_mm

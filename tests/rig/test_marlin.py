@@ -193,6 +193,19 @@ def test_a_stop_from_outside_ends_after_one_piece(bench):
     assert stage.position_state == "homed"
 
 
+@pytest.mark.parametrize("after_s", [0.3, 2.0, 5.1])
+def test_a_stop_in_motion_stands_within_a_second(bench, after_s):
+    _, stage, clock = bench
+    stage.connect()
+    stage.home()
+    asked_s = clock.monotonic_s() + after_s
+    clock.at(asked_s, stage.request_stop)
+    with pytest.raises(StoppedError):
+        stage.goto_gap(60.0)
+    assert clock.monotonic_s() - asked_s < 1.0
+    assert stage.position_state == "homed"
+
+
 def test_settings_are_audited_by_name():
     lines = M503.splitlines()
     assert read_setup([*lines, M211], "X").travel_mm == (0.0, 200.0)
