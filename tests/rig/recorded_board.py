@@ -29,6 +29,13 @@ def _read() -> dict[str, list[tuple[float, bytes]]]:
     return sections
 
 
+def hal_words() -> list[bytes]:
+    """Return what the second firmware, a grblHAL, said: section X, one reply a row."""
+    section = RECORDING.read_text(encoding="utf-8").split("==== X ")[1]
+    found = re.findall(r"<< (b(?:'[^']*'|\"[^\"]*\"))", section)
+    return [ast.literal_eval(text) for text in found]
+
+
 TIMED = _read()
 SAID = {name: [data for _, data in said] for name, said in TIMED.items()}
 

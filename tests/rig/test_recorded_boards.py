@@ -24,7 +24,7 @@ from magbend.rig.stage import (
 from magbend.rig.stage_config import StageConfig
 from magbend.rig.virtual.protocol_twin import register_board
 
-from .recorded_board import SAID, RecordedBoard, line
+from .recorded_board import SAID, RecordedBoard, hal_words, line
 from .stage_bench import InterruptingClock
 
 SEEDS = range(12)
@@ -260,3 +260,68 @@ def test_a_board_that_is_stuck_in_home_is_met_with_a_reset(seed: int) -> None:
 def _homing_on() -> list[bytes]:
     rows = [s for s in SAID["A"] if s.startswith(b"$") and not s.startswith(b"$N")]
     return [b"$22=1\r\n" if row == b"$22=0\r\n" else row for row in rows]
+
+
+def as_hal(board: RecordedBoard) -> None:
+    """Section X: another banner, unknown fields, more settings and more decimals."""
+    banner, report, details = hal_words()[:3]
+    board.report = report.replace(b"MPos:0.000", b"MPos:-29.600")
+    board.on("\x18", lambda: board.say(banner, after_s=0.04))
+    board.on(r"\$I", lambda: board.say(details))
+    settings = [
+        row.replace(b".000\r\n", b".00000\r\n") for row in SAID["A"] if row[:1] == b"$"
+    ]
+    more = [b"$%d=0\r\n" % number for number in range(340, 396)]
+    board.on(
+        r"\$\$", lambda: board.say(*settings, *more, b"$676=15\r\n", line("A", "ok"))
+    )
+
+
+def as_fluidnc(board: RecordedBoard) -> None:
+    """The dossier's FluidNC: its banner, messages at boot, reports nobody asked for."""
+    banner = b"\r\nGrbl 3.7 [FluidNC v3.7.16 (wifi) '$' for help]\r\n"
+    chatter = b"[MSG:INFO: Connecting to STA SSID:lab]\r\n"
+    board.on("\x18", lambda: board.say(chatter, banner, chatter, after_s=0.04))
+    board.on(
+        r"\$I",
+        lambda: board.say(b"[VER:3.7 FluidNC v3.7.16:]\r\n[OPT:PHS]\r\n", b"ok\r\n"),
+    )
+
+    def report_unasked() -> None:
+        if board.report is not None:
+            board.say(board.report, after_s=0.0)
+        board.later(0.2, report_unasked)
+
+    report_unasked()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("dialect", [as_hal, as_fluidnc])
+def test_dialects_connect_move_refuse_and_go_on(dialect, seed: int) -> None:
+    board = RecordedBoard(seed, line("G", "<Idle|MPos:-29.600"))
+    dialect(board)
+    stage = stage_on(board)
+    stage.connect()
+    stage.assume_homed(-29.6)
+    assert stage.limits.step_mm == 0.004
+    latched = False
+
+    def refuse() -> None:
+        nonlocal latched
+        latched = True
+        board.say(line("G", "error:15"))
+
+    def jog_again() -> None:
+        nonlocal latched
+        latched = False  # a "$" line that succeeds lifts grblHAL's latch
+        jog(board)
+
+    board.on(r"[^$].*", lambda: board.say(b"error:15\r\n" if latched else b"ok\r\n"))
+    board.on(r"\$J=.*X-31\.000.*", refuse)
+    board.on(r"\$J=.*X-30\.000.*", jog_again)
+    with pytest.raises(InterlockError):
+        stage.move_to(-31.0, feed_mm_min=300.0)
+    stage.move_to(-30.0, feed_mm_min=300.0)
+    assert stage.position_state == "homed"
+    assert not latched
+    stage.close()
