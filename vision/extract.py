@@ -115,7 +115,10 @@ def _extract(
     def joints(curve: Curve) -> Sequence[float]:
         return setting.joints_px(curve)
 
-    refined = refine(photo.grey, start, root=candidate.root, sign=sign, joints=joints)
+    refined = refine(
+        photo.grey, start, root=candidate.root, sign=sign, joints=joints,
+        face_px=setting.face_px(start.curve),
+    )  # fmt: skip
     refusal(photo, refined, candidate)
     result = measurement(refined, candidate, setting)
     return doubts(result, photo, refined, candidate, setting)

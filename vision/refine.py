@@ -30,6 +30,9 @@ _BIN_PX = 4.0
 _BINS = 200
 """Stations are averaged over bins before the fit: so far, or so many on a long rod."""
 
+APART_PX = 2.0
+"""The two lines at a clamp tell different things if they are farther apart."""
+
 ROOT_CLEAR = 0.3
 """Widths next to the clamp that are left out of the fit."""
 
@@ -89,6 +92,7 @@ class _State:
     width: float
     first: float
     last: float
+    face_px: float
     blur: float = 1.0
     scatter: float = 0.0
 
@@ -110,6 +114,7 @@ def refine(
     root: Root,
     sign: float,
     joints: Callable[[Curve], Sequence[float]] = lambda _curve: (),
+    face_px: float = 0.0,
 ) -> Refined:
     """Measure axis, edges and ends.
 
@@ -125,6 +130,8 @@ def refine(
         -1 for a light rod.
     joints : callable
         Arc lengths in px, from the root, of joints on a given curve.
+    face_px : float
+        How much of a clamp's face the camera may see, along the rod.
 
     Raises
     ------
@@ -132,7 +139,8 @@ def refine(
         If edges or ends cannot be found.
     """
     half = np.full(len(start.curve.s), 0.5 * start.width)
-    state = _State(start.curve, half, start.width, 0.0, float(start.curve.s[-1]))
+    last = float(start.curve.s[-1])
+    state = _State(start.curve, half, start.width, 0.0, last, face_px)
     for turn in range(_PASSES):
         length = state.last
         result, first = _pass(grey, state, root, sign, joints, turn)
@@ -238,7 +246,17 @@ def _ends(
     line = lines.face or lines.front
     if line is None:
         raise LostError("no_clamp", "it is not seen where the rod leaves the clamp")
+    if lines.front is not None and is_face(lines.front.s - line.s, state.face_px):
+        line = lines.front  # what has edges between them is no rod
     return tip, lines, line.s
+
+
+def is_face(apart: float, face_px: float) -> bool:
+    """Whether what lies between the two lines at a clamp is its face, seen obliquely.
+
+    It may be as dark as the rod, which then seems to end at the face's top edge.
+    """
+    return APART_PX < apart < APART_PX + face_px
 
 
 def _other_end(

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from .calibration import Calibration
 from .curve import Curve
 from .measurement import Measurement, Pose
-from .refine import LostError, Refined
+from .refine import APART_PX, LostError, Refined, is_face
 from .rod import Candidate
 
 Array = NDArray[np.float64]
@@ -68,6 +68,15 @@ class Setting:
         points = self.calibration.to_mm(curve.points, height_mm=self.rod_height_mm)
         s_mm = _arc(points)
         return [float(np.interp(joint, s_mm, curve.s)) for joint in self.joints_mm]
+
+    def face_px(self, curve: Curve) -> float:
+        """Return how much of a clamp's face may be seen at the root of a curve."""
+        if self.calibration is None:
+            return 0.0
+        ends = curve.points[:1], curve.theta[:1]
+        rise = _local(self.calibration, *ends, self.rod_height_mm).rise_along[0]
+        height = self.clamp_height_mm or self.rod_height_mm + UNKNOWN_CLAMP_MM
+        return max(0.0, -float(rise) * height)
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,8 +254,9 @@ def _root(refined: Refined, ends: _Local, setting: Setting, side_mm: float) -> f
         seen_at.append(face.s - 0.5 * rise * side_mm)
     if front is not None:
         seen_at.append(front.s + rise * setting.rod_height_mm)
-    if len(seen_at) == 2 and abs(seen_at[1] - seen_at[0]) > 2.0:
-        return seen_at[0]
+    if len(seen_at) == 2 and abs(seen_at[1] - seen_at[0]) > APART_PX:
+        apart = seen_at[1] - seen_at[0]
+        return seen_at[is_face(apart, setting.face_px(refined.fit.curve))]
     return float(np.mean(seen_at)) if seen_at else 0.0
 
 
