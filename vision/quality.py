@@ -12,6 +12,7 @@ from .refine import LostError, Refined
 from .robust import quantile
 from .rod import Candidate
 from .specimen_frame import Setting, root_hidden
+from .tip import lanes
 
 LENGTH_TOLERANCE = 0.02
 
@@ -63,6 +64,8 @@ def doubts(
         flags.append("no_clamp")
     if root_hidden(refined, setting):
         flags.append("root_hidden")
+    if candidate.root == "clamp" and _goes_on(photo, refined):
+        flags.append("clamp_doubtful")
     if photo.clipped > 0.01:
         flags.append("overexposed")
     if quantile(refined.shaded[refined.good], 0.9) > SHADE_PX:
@@ -76,3 +79,22 @@ def doubts(
     if nominal is not None and abs(length / nominal - 1.0) > LENGTH_TOLERANCE:
         flags.append("length_mismatch")
     return replace(result, flags=tuple(flags))
+
+
+def _goes_on(photo: Photo, refined: Refined) -> bool:
+    """Whether a dark line between two lighter sides goes on behind the clamp's line.
+
+    Then that line may be the border of a shadow (or the clamp has an open groove).
+    """
+    width = float(np.median(refined.width[refined.good]))
+    beside = 0.5 * width + 4.0
+    across = np.array([-beside, -0.2 * width, 0.0, 0.2 * width, beside])
+    curve = refined.fit.curve
+    behind, before = (
+        lanes(photo.grey, curve, np.linspace(first, last, 9) * width, across)
+        for first, last in ((-1.6, -1.0), (1.0, 3.0))
+    )
+    rod = np.median(before[1:4])
+    paper = np.median(before[[0, 4]])
+    light = (np.median(behind, axis=1) - rod) / (paper - rod)
+    return bool(light[1:4].max() < 0.15 and min(light[0], light[4]) > 0.3)
