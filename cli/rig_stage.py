@@ -224,7 +224,7 @@ def twin(
     board = load_board(state)
     with PtyBoard(board, SystemClock()) as served:
         typer.echo(served.port)
-        with contextlib.suppress(KeyboardInterrupt):
+        with contextlib.suppress(KeyboardInterrupt), terminating():
             while True:
                 time.sleep(3600.0)
     if state is not None:
@@ -282,8 +282,8 @@ def _told_how_to_go_on(stage: GapStage) -> Iterator[None]:
         except (KeyboardInterrupt, StoppedError) as stop:
             kept = stage.position_state == "homed"
             what = "the position was kept" if kept else "home it (magbend rig home)"
-            by = received.name
-            raise RigError(f"stopped by {by}; {what}" if by else str(stop)) from None
+            how = f"stopped by {received.name}" if received.name else str(stop)
+            raise RigError(f"{how}; {what}") from None
 
 
 def _facts(stage: GapStage) -> dict[str, Any]:
