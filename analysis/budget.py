@@ -18,19 +18,20 @@ from ..core.errors import MagbendError
 from ..core.specimen import Specimen
 from .compare import Comparison, RunComparison, usable_flux
 from .fit import FitResult
-from .nuisance import FRAME_ANGLE_SD_DEG
+from .nuisance import FRAME_ANGLE_SD_DEG, Nuisance
 
 ASSUMED = {
     "side_percent": 1.0,
     "length_mm": 0.1,
     "remanence_percent": 5.0,
     "E_percent": 10.0,
-    "clamp_angle_deg": 1.0,
-    "axis_angle_deg": 1.0,
-    "gap_mm": 0.2,
-    "scale_percent": 0.2,
+    "clamp_angle_deg": 0.5,
+    "axis_angle_deg": 0.5,
+    "gap_mm": Nuisance().gap_mm,
+    "scale_percent": Nuisance().scale_percent,
 }
-"""Standard deviations taken where the run tells none."""
+"""Standard deviations taken where the run tells none: those of the fit's priors. The
+fit's direction of the clamp against the field is that of clamp and axis together."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -158,9 +158,16 @@ def _bench_runs(paths: Sequence[Path], *, seed: int, workers: int) -> Iterator[P
             (path, pool.submit(bench_run, path, specimen=specimen, seed=hidden))
             for path, specimen, hidden in jobs
         ]
-        for path, future in futures:
-            future.result()
-            yield path
+        try:
+            for path, future in futures:
+                future.result()
+                yield path
+        except BaseException:
+            # After Ctrl-C or a failed bench nobody waits for the others.
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in multiprocessing.active_children():
+                process.terminate()
+            raise
 
 
 def _median(runs: Sequence[RunComparison], model: str) -> float:

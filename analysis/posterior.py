@@ -59,6 +59,20 @@ class Posterior:
         }
 
 
+def check_installed() -> None:
+    """Refuse before the work what cannot be sampled.
+
+    Raises
+    ------
+    MissingExtraError
+        If emcee is not installed.
+    """
+    try:
+        import emcee  # noqa: F401
+    except ImportError:
+        raise MissingExtraError("emcee", "bayes", "the posterior") from None
+
+
 def sample_posterior(
     result: FitResult,
     *,
@@ -88,10 +102,9 @@ def sample_posterior(
     MissingExtraError
         If emcee is not installed.
     """
-    try:
-        import emcee
-    except ImportError:
-        raise MissingExtraError("emcee", "bayes", "the posterior") from None
+    check_installed()
+    import emcee
+
     problem = result.problem
     p = len(problem.names)
     if p != len(result.E_MPa):

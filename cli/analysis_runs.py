@@ -126,12 +126,14 @@ def fit(
     """Fit the moduli with uncertainties; write fit.json."""
     from ..analysis.fit import fit_runs, write_fit
     from ..analysis.fit_problem import common_support
-    from ..analysis.posterior import sample_posterior
+    from ..analysis.posterior import check_installed, sample_posterior
     from ..analysis.probe import from_probe_reading
     from ..sim import Support
 
     _choice(field, ("magnet", "uniform"), "--field")
     nuisance = _nuisance(hold, prior)
+    if posterior:
+        check_installed()
     loaded, left_out = _loaded(runs)
     path = out or loaded[0].path / "fit.json"
     _outputs(path)

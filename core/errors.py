@@ -63,5 +63,5 @@ class MissingExtraError(MagbendError):
     def __init__(self, package: str, extra: str, purpose: str) -> None:
         super().__init__(
             f"{purpose} needs the package {package}, which is not installed; "
-            f'install it with: pip install "magbend[{extra}]"'
+            f'install it in the checkout with: pip install ".[{extra}]"'
         )

@@ -226,5 +226,5 @@ def test_posterior_without_emcee_names_the_extra(
 ) -> None:
     fit = fit_runs([load_run(write_run(tmp_path / "a"))])
     monkeypatch.setitem(sys.modules, "emcee", None)
-    with pytest.raises(MissingExtraError, match=r"magbend\[bayes\]"):
+    with pytest.raises(MissingExtraError, match=r"pip install \"\.\[bayes\]\""):
         sample_posterior(fit)

@@ -129,7 +129,7 @@ def test_the_published_error_is_beaten_twentyfold():
 
 def test_without_jax_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "jax", None)
-    with pytest.raises(MissingExtraError, match=r"magbend\[train\]"):
+    with pytest.raises(MissingExtraError, match=r"pip install \"\.\[train\]\""):
         train(seeds=1, steps=1)
 
 

@@ -16,7 +16,7 @@ from analysis_factory import write_run
 
 from magbend import sim
 from magbend.analysis import compare_run, fit_runs, load_run, write_report
-from magbend.analysis.budget import tip_budget
+from magbend.analysis.budget import ASSUMED, tip_budget
 from magbend.analysis.compare import RunComparison
 from magbend.analysis.fit import try_fit
 from magbend.analysis.report.build import number
@@ -174,7 +174,7 @@ def test_budget_is_sorted_and_true(tmp_path: Path) -> None:
     gap = next(line for line in lines if line.cause == "gap")
     assert run.magnet is not None
     tips = []
-    for gap_mm in (49.8, 50.2):
+    for gap_mm in (50.0 - ASSUMED["gap_mm"], 50.0 + ASSUMED["gap_mm"]):
         field = sim.MagnetField(magnet=run.magnet, gap_mm=gap_mm)
         line = sim.solve(run.run.specimen, field).centreline
         assert line is not None
@@ -190,7 +190,7 @@ def test_turning_the_clamp_counts_without_the_frame_that_turns_along(
     assert run.magnet is not None
     field = sim.MagnetField(magnet=run.magnet, gap_mm=50.0)
     tips = []
-    for angle_deg in (-0.5, 0.5):
+    for angle_deg in (-ASSUMED["clamp_angle_deg"] / 2, ASSUMED["clamp_angle_deg"] / 2):
         support = sim.Support(clamp_angle_deg=angle_deg)
         line = sim.solve(run.run.specimen, field, support=support).centreline
         assert line is not None

@@ -1,0 +1,90 @@
+"""Every example runs, draws its figure and gives a number that physics confirms."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from magbend import sim
+from magbend.analysis.metrics import fit_circle
+from magbend.analysis.twin import hide
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("gallery")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _importable() -> None:
+    mpl.use("Agg")
+    if str(EXAMPLES) not in sys.path:
+        sys.path.append(str(EXAMPLES))
+
+
+def example(name: str) -> ModuleType:
+    return importlib.import_module(name)
+
+
+def test_every_example_is_listed_and_tested() -> None:
+    names = {path.stem for path in EXAMPLES.glob("*.py")}
+    listed = (EXAMPLES / "README.md").read_text(encoding="utf-8")
+    here = Path(__file__).read_text(encoding="utf-8")
+    for name in names:
+        assert f"({name}.py)" in listed
+        assert f'example("{name}")' in here
+
+
+def test_a_graded_rod_bends_nearer_to_a_circle(folder: Path) -> None:
+    share = example("simulate_a_shape").main(folder)
+    # A weakly bent uniform rod under a tip load: curvature falls linearly, 3/4.
+    assert share["uniform"] == pytest.approx(0.75, abs=0.03)
+    assert share["graded"] > share["uniform"] + 0.1
+    assert (folder / "simulate_a_shape.svg").is_file()
+
+
+def test_a_photograph_is_measured_as_it_was_rendered(folder: Path) -> None:
+    module = example("measure_a_photograph")
+    found = module.main(folder)
+    truth = json.loads(module.ROD.with_suffix(".json").read_text(encoding="utf-8"))
+    assert found.length_mm == pytest.approx(truth["length_mm"], abs=0.05)
+    assert np.hypot(*np.subtract(found.tip_mm, truth["tip_mm"])) < 0.15
+    assert (folder / "measure_a_photograph.png").is_file()
+
+
+def test_the_magnet_predicts_the_twin_better_than_a_uniform_field(folder: Path) -> None:
+    module = example("run_the_twin_bench")
+    worst = module.main(folder)
+    assert 0.0 < worst["magnet"] < worst["uniform"] < 3.0
+    assert (folder / "run_the_twin_bench.svg").is_file()
+
+
+def test_the_fit_finds_the_twins_hidden_moduli(folder: Path) -> None:
+    fit = example("fit_the_stiffness").main(folder)
+    seed = example("run_the_twin_bench").SEED
+    truth = hide(sim.gmc(2), fit.problem.shots[0].field.magnet, seed=seed)
+    for i, section in enumerate(truth.specimen.sections):
+        low, high = fit.interval_MPa(i)
+        assert low < section.E_MPa < high
+    assert (folder / "fit_the_stiffness.svg").is_file()
+
+
+def test_designs_bend_to_the_wanted_radius(folder: Path) -> None:
+    module = example("design_backwards")
+    found = module.main(folder)
+    assert len(found) == 5
+    for one in found:
+        line = sim.solve(one.specimen, module.FIELD, points=241).centreline
+        assert line is not None
+        radius_mm = fit_circle(line.points_mm).radius_mm
+        assert radius_mm == pytest.approx(module.RADIUS_MM, rel=0.005)
+    assert (folder / "design_backwards.svg").is_file()
