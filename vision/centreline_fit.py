@@ -2,10 +2,10 @@
 
 The curve is p(s) = p0 + integral of (cos theta, sin theta), so its parameter is arc
 length without any later correction. Measured points pull along the normal only. Knots
-are dense (about one a rod width); what keeps the fit smooth is a penalty on
-theta''' (a curvature that changes evenly, as at the root, is left alone), whose weight
-is the most likely one (restricted maximum likelihood, Wood 2011). Joints of known place
-get triple knots: theta stays continuous there and the curvature may jump. The
+are dense (about one a rod width); what keeps the fit smooth is a penalty on changes of
+the bending moment (`spline.Smooth`; one that changes evenly, as at the root, is left
+alone), whose weight is the most likely one (restricted maximum likelihood, Wood 2011).
+Joints get triple knots: theta is continuous there and the curvature may jump. The
 covariance is the Bayesian one of Wahba (1983), which covers the bias of smoothing on
 average, widened by the correlation seen in the residuals.
 
@@ -26,11 +26,12 @@ from .cholesky import factor, inverse, solved, solved_half
 from .curve import Curve
 from .spline import (
     Basis,
+    Smooth,
     add_squares,
     combined,
     design,
     knots_between,
-    penalty_on_bends,
+    penalty_on_moment,
 )
 
 Array = NDArray[np.float64]
@@ -38,9 +39,6 @@ Array = NDArray[np.float64]
 SHARED = 8.0
 """Stations 1 px apart that carry one station's worth of information: bilinear samples,
 compressed pictures and shade on the paper make neighbours alike."""
-
-_FREE = 4
-"""Parameters that cost no penalty: origin, angle, curvature and its slope."""
 
 _FAIR = 0.1
 """Weight of the penalty before the last step, in units of the data's."""
@@ -77,6 +75,7 @@ class CurveFit:
     freedom: float
     jacobian: Array
     basis: Basis
+    coefficients: Array
     root: Array
 
     @property
@@ -122,6 +121,7 @@ def fit_curve(
     stiffness: float | None = None,
     shared: float = SHARED,
     within: float = 0.0,
+    smooth: Smooth | None = None,
 ) -> CurveFit:
     """Fit theta(s) to points measured near an even grid of arc length.
 
@@ -142,12 +142,15 @@ def fit_curve(
     theta : ndarray, shape (n,), optional
         Tangent angles to start from; otherwise from the points.
     stiffness : float, optional
-        Weight of the penalty, px^5; the most likely one when not given.
+        Weight of the penalty, px^5 (px^7 for a moment of order 3); the most likely one
+        when not given.
     shared : float
         Neighbouring measurements that count as one: the fewer, the more supple the
         curve.
     within : float
         Sum of the squares of the measurements about the means that the points are.
+    smooth : Smooth, optional
+        What is known of the bending moment.
 
     Returns
     -------
@@ -156,11 +159,12 @@ def fit_curve(
     """
     knots = knots_between(s[0], s[-1], spacing, joints)
     basis, middle = design(knots, s), design(knots, 0.5 * (s[1:] + s[:-1]))
-    penalty = penalty_on_bends(knots)
+    smooth = smooth or Smooth()
+    penalty, nullity = penalty_on_moment(knots, smooth)
     if theta is None:
         theta = _chord_angles(points)
     step = float(s[1] - s[0])
-    coefficients = _start(basis, theta, penalty * spacing**5)
+    coefficients = _start(basis, theta, penalty * spacing ** (2 * smooth.order + 1))
     start, *_ = _path(step, np.zeros(2), coefficients, basis, middle)
     origin = np.mean((points - start)[weights > 0.0], axis=0)
     for turn in range(iterations):
@@ -169,7 +173,7 @@ def fit_curve(
         strength, normal, right, pull = _weighed(
             jacobian, _residual(points, path, rate, weights), weights, penalty,
             coefficients, math.nan if stiffness is None else stiffness, shared, within,
-            _FREE, turn == iterations - 1,
+            nullity + 1, turn == iterations - 1,
         )  # fmt: skip
         half = factor(normal)
         change = solved(half, right - strength * pull)
@@ -180,7 +184,7 @@ def fit_curve(
     root = inverse(half)
     return _with_covariance(
         curve, _residual(points, path, rate, weights), weights, within, shared,
-        jacobian, basis, root, float(_freedom(root, penalty, strength)),
+        jacobian, basis, coefficients, root, float(_freedom(root, penalty, strength)),
     )  # fmt: skip
 
 
@@ -270,7 +274,9 @@ def _weighed(
     size = jacobian.shape[1]
     normal, right, pull = np.zeros((size, size)), np.zeros(size), np.zeros(size)
     _add_equations(jacobian, weight / shared, residual, normal, right)
-    data, bend, stored = np.trace(normal), np.trace(penalty), 0.0
+    # The median, because ties at joints are far stiffer than the rest.
+    data, stored = np.trace(normal), 0.0
+    bend = (size - 1) * np.median(np.diag(penalty))
     for j in range(size - 1):
         for k in range(size - 1):
             pull[j + 1] += penalty[j, k] * coefficients[k]
@@ -351,7 +357,7 @@ def _freedom(root: Array, penalty: Array, strength: float) -> float:
 
 def _with_covariance(
     curve: Curve, residual: Array, weight: Array, within: float, shared: float,
-    jacobian: Array, basis: Basis, root: Array, freedom: float,
+    jacobian: Array, basis: Basis, coefficients: Array, root: Array, freedom: float,
 ) -> CurveFit:  # fmt: skip
     """Widen the covariance by what the residuals of neighbours have in common."""
     used = weight > 0.0
@@ -368,6 +374,7 @@ def _with_covariance(
         freedom=freedom,
         jacobian=jacobian,
         basis=basis,
+        coefficients=coefficients,
         root=root * noise * np.sqrt(correlation / shared),
     )
 

@@ -3,8 +3,9 @@
 A curve smooth enough for the sections is too stiff for the joints, and one supple
 enough for the joints follows every shade beside the clamp, where shade turns the
 direction of the rod. So joints are looked for first. The measured offsets are linear in
-the change of theta(s): a smooth part with the penalty on theta''' of `centreline_fit`,
-and for each joint a jump of curvature and of its slope, with a broad Gaussian prior.
+the change of theta(s): a smooth part with a penalty on theta''', and for each joint a
+curvature beyond it that is larger or smaller by a factor, as M / EI is for a moment M
+that goes on smoothly, with a broad Gaussian prior.
 Joints are added one by one while the marginal likelihood (evidence, at its maximum over
 the weight of the penalty) grows by more than the choice among places explains.
 """
@@ -25,12 +26,15 @@ _THIN, _MOST_STATIONS, _MOST_PLACES = 4, 200, 55
 for at so many places. With more, the linear algebra library would wake its threads."""
 _PIECES = 16
 _MOST = 4
-_LEAST_GAIN = 4.0
+_LEAST_GAIN = 6.0
 """Gain of twice the log evidence for a joint to be believed, beyond the choice among
 the places two widths apart where it might be."""
 _ENDS = 3.8
 """Widths next to either end where a jump could not be told from shade."""
 _APART = 3.0
+_PRIOR = 0.05**2
+"""Prior precision of a relative change of curvature, of the order of one, times the
+variance of a station: they are good to about a twentieth of a pixel."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +42,7 @@ class _Model:
     """Linear model of the offsets: columns, their prior precision, and the data."""
 
     s: Array
+    angle: Array
     normals: Array
     weight: Array
     offset: Array
@@ -142,7 +147,7 @@ def _model(
     data = data + smooth[:, 1:] @ start
     data = data + _moved((angle - angles @ start)[:, None], at, normals)[:, 0]
     return _Model(
-        at, normals, weight, data, smooth, bend, weight.sum() / shared, shared
+        at, angle, normals, weight, data, smooth, bend, weight.sum() / shared, shared
     )
 
 
@@ -164,11 +169,11 @@ def _moved(angles: Array, s: Array, normals: Array) -> Array:
     return np.asarray(out)
 
 
-def _jumps(model: _Model, places: Array) -> Array:
-    """Columns of a jump of curvature and of its slope at each place, (n, 2 m)."""
-    beyond = np.clip(model.s[:, None] - places, 0.0, None) / model.s[-1]
-    angles = np.stack([beyond, beyond**2], axis=2).reshape(len(model.s), -1)
-    return _moved(angles, model.s, model.normals)
+def _ramps(model: _Model, places: Array) -> Array:
+    """Columns of a relative change of curvature beyond each place, (n, m)."""
+    turned = model.angle[:, None] - np.interp(places, model.s, model.angle)
+    beyond = np.where(model.s[:, None] > places, turned, 0.0)
+    return _moved(beyond, model.s, model.normals)
 
 
 def _gains(model: _Model, joints: list[float], places: Array | None) -> Array:
@@ -178,16 +183,15 @@ def _gains(model: _Model, joints: list[float], places: Array | None) -> Array:
     """
     columns = model.smooth
     if joints:
-        columns = np.column_stack([columns, _jumps(model, np.array(joints))])
+        columns = np.column_stack([columns, _ramps(model, np.array(joints))])
     weighted = columns * (model.weight / model.shared)[:, None]
     normal, right = weighted.T @ columns, weighted.T @ model.offset
     total = float(np.sum(model.weight * model.offset**2)) / model.shared
     size, smooth = len(right), model.smooth.shape[1]
     bend = np.zeros((size, size))
     bend[:smooth, :smooth] = model.bend
-    prior = _prior(model)
     tight = np.zeros(size)
-    tight[smooth:] = prior
+    tight[smooth:] = _PRIOR
     # normal + tight and bend share eigenvectors V: V' (normal + tight) V = 1 and
     # V' bend V = diag(stiff), so that every strength costs a sum and no solve.
     held = normal + np.diag(tight) + 1e-13 * np.trace(normal) * np.eye(size)
@@ -202,38 +206,23 @@ def _gains(model: _Model, joints: list[float], places: Array | None) -> Array:
     joined = len(joints)
     if places is not None:
         joined += 1
-        gain, det = _joined(model, places, weighted, vectors, turned, loosen, prior)
+        gain, det = _joined(model, places, weighted, vectors, turned, loosen)
         left, volume = left - gain, volume + np.log(det)
     left = np.maximum(left, 1e-12 * total + 1e-30)
     score = -(model.count - 4.0) * np.log(left) - volume
-    score += _PIECES * np.log(strengths)[:, None] + 2.0 * joined * np.log(prior)
+    score += _PIECES * np.log(strengths)[:, None] + joined * np.log(_PRIOR)
     return np.asarray(score.max(axis=0))
 
 
 def _joined(
     model: _Model, places: Array, weighted: Array, vectors: Array, turned: Array,
-    loosen: Array, prior: float,
+    loosen: Array,
 ) -> tuple[Array, Array]:  # fmt: skip
     """Return fall of the misfit and determinant, (strengths, m), of a joint each."""
-    jumps = _jumps(model, places)
-    first, second = jumps[:, 0::2], jumps[:, 1::2]
+    ramps = _ramps(model, places)
     share = (model.weight / model.shared)[:, None]
-    cross = vectors.T @ (weighted.T @ jumps)
-    c, d = cross[:, 0::2], cross[:, 1::2]
-    offset = model.offset[:, None]
-    aa = (share * first**2).sum(axis=0) + prior - loosen @ c**2
-    bb = (share * second**2).sum(axis=0) + prior - loosen @ d**2
-    ab = (share * first * second).sum(axis=0) - loosen @ (c * d)
-    fa = (share * first * offset).sum(axis=0) - loosen @ (c * turned[:, None])
-    fb = (share * second * offset).sum(axis=0) - loosen @ (d * turned[:, None])
-    det = aa * bb - ab**2
-    return (bb * fa**2 - 2.0 * ab * fa * fb + aa * fb**2) / det, det
-
-
-def _prior(model: _Model) -> float:
-    """Prior precision of a jump times the variance of a station.
-
-    A jump of curvature of the order of one radian over the whole length; stations are
-    good to about a twentieth of a pixel.
-    """
-    return 0.05**2 / 1.0**2
+    cross = vectors.T @ (weighted.T @ ramps)
+    own = (share * ramps**2).sum(axis=0) + _PRIOR - loosen @ cross**2
+    pull = (share * ramps * model.offset[:, None]).sum(axis=0)
+    pull = pull - loosen @ (cross * turned[:, None])
+    return pull**2 / own, own

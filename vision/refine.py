@@ -14,8 +14,10 @@ from .clamp import ClampLines, find_clamp
 from .curve import Curve
 from .edges import Edges, find_edges
 from .joints import find_joints
+from .moment import weighed_fit
 from .robust import median
 from .rod import Root
+from .spline import Smooth
 from .tip import EndFace, find_tip
 from .track import Start
 
@@ -326,14 +328,21 @@ def _fit(
             use.astype(np.float64), width=width, shared=SHARED,
         )  # fmt: skip
 
+    spacing = max((1.0 if supple else 1.5) * width, (last - first) / 50.0)
+    places = [x for x in places if spacing < x < last - first - spacing]
+
     def fitted(weights: Array) -> CurveFit:
-        return fit_curve(
-            s - first, measured, _held_ends(weights, s, width), theta=theta,
-            spacing=max((1.0 if supple else 1.5) * width, (last - first) / 50.0),
-            joints=places, iterations=1,
-            shared=(3.0 if supple else SHARED) / float(seen.s[1]),
-            within=float(within[weights > 0.0].sum()),
-        )  # fmt: skip
+        def fit(smooth: Smooth) -> CurveFit:
+            return fit_curve(
+                s - first, measured, _held_ends(weights, s, width), theta=theta,
+                spacing=spacing, joints=places, iterations=1, smooth=smooth,
+                shared=(3.0 if supple else SHARED) / float(seen.s[1]),
+                within=float(within[weights > 0.0].sum()),
+            )  # fmt: skip
+
+        if supple:
+            return fit(Smooth())
+        return weighed_fit(fit, places, float(weights.sum()) / SHARED)
 
     fit = fitted(weights)
     if turn >= _ROUGH_PASSES:

@@ -14,6 +14,8 @@ from ..core.jit import njit
 Array = NDArray[np.float64]
 
 _DEGREE = 3
+_TIED = 1e3
+"""Weight of a kink of the moment at a joint against one smeared over a piece."""
 
 
 def knots_between(
@@ -116,8 +118,73 @@ def _fill_basis(
             slopes[i, j] = 3.0 * rate
 
 
-def penalty_on_bends(knots: Array) -> Array:
-    """Return P with c^T P c the integral of theta'''^2, constant between knots."""
+class Smooth(NamedTuple):
+    """What a rod's bending moment, over its stiffness at the clamp, is taken to be.
+
+    Parameters
+    ----------
+    order : int
+        The derivative that is small: 2 if M is nearly straight, 3 if nearly a parabola.
+    ratios : tuple of float, optional
+        Curvature beyond over curvature before each joint. M and its slope pass through
+        a joint unchanged, so theta'' changes by this factor too. Without ratios nothing
+        is known of M at the joints.
+    """
+
+    order: int = 2
+    ratios: tuple[float, ...] | None = None
+
+
+def penalty_on_moment(knots: Array, smooth: Smooth) -> tuple[Array, int]:
+    """Return P with c^T P c the integral of M'' or M''' squared, and its nullity.
+
+    M is a parabola between knots. Its second derivative jumps there, and a jump J
+    between pieces of length h counts as J^2 / h in the integral of M'''^2.
+    """
+    first, length, bend, slope_at_start, slope_at_end = _pieces(knots)
+    joined = np.diff(first) > 1
+    joints, tied = int(joined.sum()), smooth.ratios is not None
+    compliance = np.cumprod(np.concatenate([[1.0], smooth.ratios or np.ones(joints)]))
+    stiffness = 1.0 / compliance[np.concatenate([[0], np.cumsum(joined)])][:, None]
+    apart = 0.5 * (length[1:] + length[:-1])
+    penalty = np.zeros((len(knots) - 4, len(knots) - 4))
+    bend = bend * stiffness
+    if smooth.order == 2:
+        add_squares(first, bend, length, penalty)
+    else:
+        _add_jumps(
+            first, bend, bend, np.where(tied | ~joined, 1.0, 0.0) / apart, penalty
+        )
+    if tied:
+        tie = _TIED * joined / apart ** (2 * smooth.order - 3)
+        _add_jumps(
+            first, slope_at_end * stiffness, slope_at_start * stiffness, tie, penalty
+        )
+    return penalty, 1 + smooth.order + joints * (1 if tied else smooth.order)
+
+
+@njit(cache=True)
+def _add_jumps(
+    first: NDArray[np.int64], before: Array, after: Array, weight: Array, normal: Array
+) -> None:
+    """Add the weighted squares of `after` of a piece less `before` of the one ahead."""
+    row = np.zeros(7)
+    for i in range(weight.size):
+        row[:] = 0.0
+        shift = first[i + 1] - first[i]
+        for j in range(4):
+            row[j] -= before[i, j]
+            row[shift + j] += after[i + 1, j]
+        for j in range(shift + 4):
+            for k in range(shift + 4):
+                normal[first[i] + j, first[i] + k] += weight[i] * row[j] * row[k]
+
+
+def _pieces(knots: Array) -> tuple[NDArray[np.int64], Array, Array, Array, Array]:
+    """Return of each piece: first spline, length, theta''', theta'' at both ends.
+
+    The last three are rows of the four splines' own, shape (pieces, 4) each.
+    """
     low, high = knots[_DEGREE:-_DEGREE - 1], knots[_DEGREE + 1:-_DEGREE]  # fmt: skip
     real = high > low
     low, length = low[real], (high - low)[real]
@@ -125,10 +192,9 @@ def penalty_on_bends(knots: Array) -> Array:
     inner = low[:, None] + length[:, None] * np.array([0.1, 0.5, 0.9])
     basis = design(knots, inner.ravel())
     a, b, c = basis.slope.reshape(len(low), 3, 4).transpose(1, 0, 2)
-    bend = (a - 2.0 * b + c) / (0.4 * length[:, None]) ** 2
-    penalty = np.zeros((len(knots) - 4, len(knots) - 4))
-    add_squares(basis.first[::3], bend, length, penalty)
-    return penalty
+    step, half = 0.4 * length[:, None], 0.5 * length[:, None]
+    bend, middle = (a - 2.0 * b + c) / step**2, (c - a) / (2.0 * step)
+    return basis.first[::3], length, bend, middle - half * bend, middle + half * bend
 
 
 @njit(cache=True)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
 from magbend.vision.centreline_fit import fit_curve
-from magbend.vision.spline import design, knots_between, penalty_on_bends
+from magbend.vision.spline import Smooth, design, knots_between, penalty_on_moment
 
 
 def arc(length: float, turn: float, step: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
@@ -38,7 +38,8 @@ def test_penalty_is_the_integral_of_the_third_derivative_squared():
     middle = 0.5 * (knots[3:-4] + knots[4:-3])
     third = BSpline(knots, c, 3)(middle, nu=3)
     exact = np.sum(third**2 * np.diff(knots[3:-3]))
-    assert c @ penalty_on_bends(knots) @ c == pytest.approx(exact, rel=1e-9)
+    penalty, _ = penalty_on_moment(knots, Smooth())
+    assert c @ penalty @ c == pytest.approx(exact, rel=1e-9)
 
 
 @settings(max_examples=20, deadline=None)

@@ -1,0 +1,108 @@
+"""How a rod's bending moment runs: the likeliest of a few physical priors.
+
+A photograph leaves the direction at the clamp to a fit's extrapolation, which is the
+better the fewer numbers it has to find. Elasticity leaves few: the curvature is M / EI,
+the moment M(s) is smooth, and at a joint of two stiffnesses the curvature changes by a
+factor while M and its slope go through. Not so if the load changes there as well (a
+section magnetised otherwise). Which holds, and whether M is rather straight or rather
+a parabola, the Bayesian information criterion weighs (Schwarz 1978).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .centreline_fit import CurveFit
+from .curve import Curve
+from .spline import Smooth
+
+Array = NDArray[np.float64]
+
+_STRONG = 6.0
+"""Gain for which a kink of the moment is believed (Kass and Raftery 1995)."""
+_MOST = 8.0
+"""Factor of curvatures beyond which a joint is no change of stiffness."""
+
+
+def weighed_fit(
+    fit: Callable[[Smooth], CurveFit], joints: Sequence[float], count: float
+) -> CurveFit:
+    """Return the mean of the fits with each prior, weighed by their likelihood.
+
+    Parameters
+    ----------
+    fit : callable
+        Fits with a prior.
+    joints : sequence of float
+        Arc lengths of the joints.
+    count : float
+        Number of independent measurements.
+
+    Returns
+    -------
+    CurveFit
+        Its covariance holds the doubt which prior is right (Hoeting et al. 1999).
+    """
+    free = fit(Smooth())
+    fits, nearest = [free], free
+    if joints:
+        ratios = _ratios(free.curve, joints)
+        if any(not 1.0 / _MOST < ratio < _MOST for ratio in ratios):
+            return free
+        nearest = fit(Smooth(2, ratios))
+        fits.append(fit(Smooth(2, _ratios(nearest.curve, joints))))
+    fits.append(fit(Smooth(3, _ratios(nearest.curve, joints))))
+    loss = np.array([_criterion(item, count) for item in fits])
+    loss[0] += _STRONG if joints else 0.0
+    weights = np.exp(-0.5 * (loss - loss.min()))
+    return _mean(fits, weights / weights.sum())
+
+
+def _mean(fits: Sequence[CurveFit], weights: Array) -> CurveFit:
+    """Return the mean of fits on the same knots, with the scatter in its covariance."""
+
+    def mean(values: list[Array]) -> Array:
+        return np.asarray(np.tensordot(weights, np.array(values), axes=1))
+
+    curve = Curve(
+        s=fits[0].curve.s,
+        points=mean([item.curve.points for item in fits]),
+        theta=mean([item.curve.theta for item in fits]),
+        kappa=mean([item.curve.kappa for item in fits]),
+    )
+    coefficients = mean([item.coefficients for item in fits])
+    parts = []
+    for item, weight in zip(fits, weights, strict=True):
+        shift = (item.curve.points[0] - curve.points[0]) @ curve.normals[0]
+        away = np.concatenate([[shift], item.coefficients - coefficients])
+        parts.append(np.sqrt(weight) * np.column_stack([item.root, away]))
+    best = fits[int(np.argmax(weights))]
+    # R R^T of all parts side by side, made triangular again.
+    upper = np.linalg.qr(np.hstack(parts)[::-1].T, mode="r")
+    return replace(
+        best,
+        curve=curve,
+        residual=mean([item.residual for item in fits]),
+        coefficients=coefficients,
+        root=np.ascontiguousarray(upper.T[::-1, ::-1]),
+    )
+
+
+def _criterion(fit: CurveFit, count: float) -> float:
+    """Return the information criterion: misfit, and freedom by which it was bought."""
+    return count * 2.0 * math.log(fit.noise) + math.log(count) * fit.freedom
+
+
+def _ratios(curve: Curve, joints: Sequence[float]) -> tuple[float, ...]:
+    """Return curvature beyond over curvature before each joint."""
+    step = curve.s[1] - curve.s[0]
+    places = np.asarray(joints, dtype=np.float64)
+    before = np.interp(places - step, curve.s, curve.kappa)
+    beyond = np.interp(places + step, curve.s, curve.kappa)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return tuple(float(ratio) for ratio in beyond / before)
