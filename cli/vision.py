@@ -424,10 +424,10 @@ def _below_the_camera(rod_height_mm: float, camera_height_mm: float) -> None:
 
 
 def _workers(pictures: int) -> int:
-    """Return how many processes are worth their start (about 2 s each)."""
+    """Return how many processes are worth their start (about a second each)."""
     import os
 
-    return 1 if pictures < 24 else max(1, os.cpu_count() or 1)
+    return 1 if pictures < 60 else max(1, os.cpu_count() or 1)
 
 
 def _tell_frames(result: Any, *, json_output: bool) -> None:

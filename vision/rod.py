@@ -129,7 +129,7 @@ def _thin_parts(roi: Mask, origin: tuple[int, int], binary: Binary) -> list[Cand
     common, thinner = _ridge_half_widths(depth)
     if 0.0 < common < _GRAIN and depth.max() > 4.0 * _GRAIN:
         # Grains of noise along the edges of something wide outnumber the rod.
-        smooth = np.asarray(cv2.medianBlur(roi, 3))
+        smooth = np.asarray(cv2.medianBlur(roi, 3), dtype=np.uint8)
         common, thinner = _ridge_half_widths(_edge_distance(smooth, origin, binary))
     found = _of_width(roi, depth, common, origin, binary) if common else []
     if not thinner:
