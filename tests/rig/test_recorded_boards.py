@@ -27,7 +27,7 @@ from magbend.rig.virtual.protocol_twin import register_board
 from .recorded_board import SAID, RecordedBoard, hal_words, line
 from .stage_bench import InterruptingClock
 
-SEEDS = range(12)
+SEEDS = range(5)
 _NAMES = itertools.count()
 
 
