@@ -56,9 +56,9 @@ class Presence:
     def release(self) -> None:
         """Say that nobody holds the port."""
         self._is_owner = False
+        self.clear_stop()  # first: a request without an owner was not met
         if self.owner() == os.getpid():
             self._owner_file.unlink(missing_ok=True)
-        self.clear_stop()
 
     def owner(self) -> int | None:
         """Return the process that holds the port, if it is alive."""

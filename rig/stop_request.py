@@ -39,7 +39,10 @@ def stop_from_outside(config: StageConfig, clock: Clock) -> str:
         return _hold_directly(config, port, clock)
     presence.ask_to_stop()
     deadline_s = clock.monotonic_s() + _STOP_S
-    while presence.stop_asked() and presence.owner() is not None:
+    while presence.stop_asked():
+        if presence.owner() is None:
+            presence.clear_stop()
+            return _hold_directly(config, port, clock)
         if clock.monotonic_s() > deadline_s:
             raise StageTimeoutError(
                 f"process {owner} holds {port} and does not react: it is not moving "

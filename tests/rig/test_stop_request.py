@@ -38,6 +38,21 @@ def test_an_owner_that_does_not_react_is_said():
     assert bench.stage.stop_requested()
 
 
+def test_an_owner_that_dies_while_it_is_asked_is_replaced():
+    bench = homed_bench()
+    config = bench.raw._config
+    bench.board.receive(b"$J=G91X-20F300\n")
+
+    def die() -> None:
+        bench.board.port_taken = False
+        bench.raw._presence._owner_file.unlink()
+
+    bench.later(0.5, die)
+    assert "has been stopped" in stop_from_outside(config, bench.clock)
+    assert not bench.board.mover.running
+    assert not bench.raw._presence.stop_asked()
+
+
 def test_an_owner_that_is_dead_is_no_owner(tmp_path):
     presence = Presence("/dev/ttyTEST")
     presence._owner_file.write_text('{"pid": 999999999}')
