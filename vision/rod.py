@@ -126,12 +126,13 @@ def _fill(
 def _thin_parts(roi: Mask, origin: tuple[int, int], binary: Binary) -> list[Candidate]:
     """Return the thin parts of a thing: of the commonest width, or grown from that."""
     depth = _edge_distance(roi, origin, binary)
-    common, thinner = _ridge_half_widths(depth)
-    if 0.0 < common < _GRAIN and depth.max() > 4.0 * _GRAIN:
-        # Grains of noise along the edges of something wide outnumber the rod.
-        smooth = np.asarray(cv2.medianBlur(roi, 3), dtype=np.uint8)
-        common, thinner = _ridge_half_widths(_edge_distance(smooth, origin, binary))
+    ridge = _ridge(np.ascontiguousarray(depth))
+    common, thinner = _half_widths(ridge)
     found = _of_width(roi, depth, common, origin, binary) if common else []
+    if not found and common < _GRAIN:
+        # Grains of noise along the edges of something wide may outnumber the rod.
+        common, thinner = _half_widths(ridge[ridge >= _GRAIN])
+        found = _of_width(roi, depth, common, origin, binary) if common else []
     if not thinner:
         return found
     # A bar that reaches far into the picture is long and thin itself, but the clamp of
@@ -218,13 +219,12 @@ def _near(core: Mask, reach: float) -> Mask:
     return near
 
 
-def _ridge_half_widths(depth: NDArray[np.float32]) -> tuple[float, float]:
+def _half_widths(ridge: NDArray[np.float32]) -> tuple[float, float]:
     """Return the half widths that long and thin parts of the medial axis share.
 
     First the commonest for its width, then the commonest of much thinner ones; 0 where
     there is none long enough.
     """
-    ridge = _ridge(np.ascontiguousarray(depth))
     if ridge.size < 8:
         return 0.0, 0.0
     bins = np.floor(np.log(ridge) / 0.09).astype(int)
@@ -316,11 +316,12 @@ def _trace(
 
 
 def _contact(piece: Mask, other: Mask) -> tuple[Mask, int]:
-    """Return the pixels where two masks meet and the number of separate places."""
+    """Return the pixels of one place where two masks meet, and how many there are."""
     both = piece & other
     if not both.any():
         return both, 0
-    return both, cv2.connectedComponents(_grown(both))[0] - 1
+    places, labels = cv2.connectedComponents(_grown(both))
+    return both & (labels == 1), places - 1
 
 
 def _grown(mask: Mask) -> Mask:

@@ -44,6 +44,13 @@ def test_rod_is_found_beside_a_clamp_with_noise_along_its_edges(share):
     assert rod.length_px == pytest.approx(250.0, abs=20.0)
 
 
+def test_rod_between_two_things_touches_both():
+    (rod,) = candidates(things(CLAMP, ROD, (410, 150, 100, 100)))
+    assert rod.root == "clamp"
+    assert rod.contacts == 2
+    assert rod.length_px == pytest.approx(250.0, abs=30.0)
+
+
 def test_arm_is_the_clamp_of_the_thinner_thing_that_grows_from_it():
     (rod,) = candidates(things((0, 180, 420, 40), (420, 196, 120, 5)))
     assert rod.root == "clamp"
