@@ -86,17 +86,13 @@ def find_joints(
     if len(places) < 3:
         return joints
     choice = 2.0 * np.log(max(0.5 * (last - first) / width, 1.0))
-    level = -_gains(model, joints, None)[0]
     while len(joints) < _MOST:
         free = _free(places, joints, _APART * width)
-        if not free.size:
+        alone, joined = _evidence(model, joints, free)
+        if not free.size or joined.max() - alone < _LEAST_GAIN + choice:
             break
-        found = -_gains(model, joints, free)
-        best = int(np.argmin(found))
-        if level - found[best] < _LEAST_GAIN + choice:
-            break
-        joints = _settled(model, [*joints, float(free[best])], 0.25 * width)
-        level = -_gains(model, joints, None)[0]
+        best = float(free[int(np.argmax(joined))])
+        joints = _settled(model, [*joints, best], 0.25 * width)
     return sorted(joints)
 
 
@@ -114,7 +110,8 @@ def _settled(model: _Model, joints: list[float], step: float) -> list[float]:
             rest = joints[:k] + joints[k + 1 :]
             near = joints[k] + step * reach * np.linspace(-1.0, 1.0, 13)
             near = near[(near > 4.0 * step) & (near < model.s[-1] - 4.0 * step)]
-            joints[k] = float(near[int(np.argmax(_gains(model, rest, near)))])
+            _, joined = _evidence(model, rest, near)
+            joints[k] = float(near[int(np.argmax(joined))])
     return joints
 
 
@@ -143,9 +140,7 @@ def _model(
     bend[4:, 4:] = sums.T @ sums
     data = np.where(weight > 0.0, np.nan_to_num(mean), 0.0)
     # Offsets count from a curve that is bent itself: give the model that curve too.
-    start = np.linalg.lstsq(angles, angle, rcond=None)[0]
-    data = data + smooth[:, 1:] @ start
-    data = data + _moved((angle - angles @ start)[:, None], at, normals)[:, 0]
+    data = data + _moved(angle[:, None], at, normals)[:, 0]
     return _Model(
         at, angle, normals, weight, data, smooth, bend, weight.sum() / shared, shared
     )
@@ -176,11 +171,8 @@ def _ramps(model: _Model, places: Array) -> Array:
     return _moved(beyond, model.s, model.normals)
 
 
-def _gains(model: _Model, joints: list[float], places: Array | None) -> Array:
-    """Return twice the log evidence with one more joint at each place, shape (m,).
-
-    Without places: of the given joints alone, shape (1,).
-    """
+def _evidence(model: _Model, joints: list[float], places: Array) -> tuple[float, Array]:
+    """Return twice the log evidence of joints, and of one more at each place, (m,)."""
     columns = model.smooth
     if joints:
         columns = np.column_stack([columns, _ramps(model, np.array(joints))])
@@ -201,17 +193,20 @@ def _gains(model: _Model, joints: list[float], places: Array | None) -> Array:
     strengths = np.trace(normal) * 10.0 ** np.arange(-10.0, 2.0, 0.5)
     loosen = 1.0 / (1.0 + strengths[:, None] * stiff)
     turned = vectors.T @ right
-    left = (total - loosen @ turned**2)[:, None]
-    volume = (np.linalg.slogdet(held)[1] - np.log(loosen).sum(axis=1))[:, None]
-    joined = len(joints)
-    if places is not None:
-        joined += 1
-        gain, det = _joined(model, places, weighted, vectors, turned, loosen)
-        left, volume = left - gain, volume + np.log(det)
-    left = np.maximum(left, 1e-12 * total + 1e-30)
-    score = -(model.count - 4.0) * np.log(left) - volume
-    score += _PIECES * np.log(strengths)[:, None] + joined * np.log(_PRIOR)
-    return np.asarray(score.max(axis=0))
+    left = total - loosen @ turned**2
+    volume = np.linalg.slogdet(held)[1] - np.log(loosen).sum(axis=1)
+    gain, det = _joined(model, places, weighted, vectors, turned, loosen)
+
+    def score(left: Array, volume: Array, joined: int) -> Array:
+        left = np.maximum(left, 1e-12 * total + 1e-30)
+        likelihood = -(model.count - 4.0) * np.log(left) - volume
+        likelihood += _PIECES * np.log(strengths)[:, None] + joined * np.log(_PRIOR)
+        return np.asarray(likelihood.max(axis=0))
+
+    (alone,) = score(left[:, None], volume[:, None], len(joints))
+    return float(alone), score(
+        left[:, None] - gain, volume[:, None] + np.log(det), len(joints) + 1
+    )
 
 
 def _joined(
