@@ -80,7 +80,8 @@ def _remanence() -> list[Finding]:
         findings.append(
             Finding(
                 claim=f"{flux_mT:g} mT at {gap_mm:g} mm means {printed_T:.4f} T",
-                evidence=f"Eqs. 1-4 give {remanence_T:.4f} T{needed}",
+                evidence="Eqs. 1-4 for a cube of 55 mm give "
+                f"{remanence_T:.4f} T{needed}",
                 verdict="reproduced" if same else "differs",
                 value=remanence_T,
             )
@@ -99,8 +100,9 @@ def _standoff() -> list[Finding]:
             evidence=f"they grow as side^{found.power:.2f}, and one remanence misses "
             f"them by {found.constant_percent:.0f} % (RMS); a probe "
             f"{found.standoff_mm:.2f} mm from the face of a rod of "
-            f"{found.remanence_mT:.0f} mT reads them within {worst:.1f} %: probably "
-            "probe readings, and remanence and moduli both about "
+            f"{found.remanence_mT:.0f} mT reads them within {worst:.1f} %. Two "
+            "unknowns for three readings are no proof; if they are probe readings, "
+            "remanence and moduli are both about "
             f"{found.remanence_mT / 20.07:.1f} times larger",
             verdict="supports" if better else "differs",
             value=found.remanence_mT,
@@ -133,8 +135,9 @@ def _uniform_field() -> list[Finding]:
     return [
         Finding(
             claim="a uniform field is a reasonable hypothesis for the simulation",
-            evidence="deflection of GMC 2's tip in the true field against the uniform "
-            f"one, bending away from and toward the magnet: {'; '.join(parts)}",
+            evidence="deflection of GMC 2's tip before a cube of 55 mm against that in "
+            "the uniform field of the same flux at the undeformed tip, bending away "
+            f"from and toward the magnet: {'; '.join(parts)}",
             verdict="matters" if abs(largest) > 5.0 else "negligible",
             value=largest,
         )
@@ -157,7 +160,8 @@ def _weight() -> list[Finding]:
             claim="the rod's weight is left out",
             evidence=f"weight {weight_N * 1e3:.2f} mN against a magnetic load of "
             f"{magnetic_N * 1e3:.2f} mN at 50 mT (density {DENSITY_KG_M3:g} kg/m3, "
-            f"estimated); in the plane of bending it moves the tip by {change:+.0f} %",
+            f"estimated); if it acts in the plane of bending, which the paper does not "
+            f"say, it moves the tip by {change:+.0f} %",
             verdict="matters" if abs(change) > 5.0 else "negligible",
             value=change,
         )
@@ -200,7 +204,8 @@ def _end_face() -> list[Finding]:
             claim="the Maxwell tensor is applied at the end of the top section",
             evidence=f"the traction on the end face alone carries {share:.4f} of the "
             "load M A B on a bar of 1 x 1 x 30 mm; the rest acts on the sides near the "
-            "tip. Applied to the face only, the load and the fitted moduli are half",
+            "tip. If it was applied to the face only, which the paper does not settle, "
+            "the load and the moduli fitted with it are half",
             verdict="matters" if share < 0.9 else "negligible",
             value=share,
         )
@@ -223,7 +228,7 @@ def _degeneracy() -> list[Finding]:
         Finding(
             claim="moduli of 20-15-10 MPa follow from fitting the bent shapes",
             evidence=f"{factor:g} times the moduli with {factor:g} times the remanence "
-            f"give the same shapes within {difference_mm:.0e} mm: only the ratio "
+            f"give the same shapes within {difference_mm:.1g} mm: only the ratio "
             "follows, so the moduli are as good as the remanence",
             verdict="matters" if difference_mm < 1e-6 else "negligible",
             value=difference_mm,
