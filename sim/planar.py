@@ -380,7 +380,11 @@ def _solve_row(  # type: ignore[no-untyped-def]
                 if done:
                     break
             else:
-                done = change < (NEAR if stage == COARSE else SMALL)
+                done = change < NEAR
+                if stage == FINE:
+                    # In long rods the next residual may be large, small as u is.
+                    spread = abs(D[0, 0]) + abs(D[0, 1]) + abs(D[0, 2])
+                    done = change < SMALL and change * change * spread < ENOUGH
                 if not size < math.inf or not (
                     done or (change < first and change <= SHRINK * before and k < 20)
                 ):

@@ -7,6 +7,7 @@ continuation in many steps.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from magbend.sim import (
     Solution,
     Support,
     UniformField,
+    sensitivities,
     solve,
 )
 from magbend.sim.check import check_solve
@@ -245,6 +247,34 @@ def test_a_rod_drawn_round_a_magnet_is_stable_in_the_plane_only() -> None:
         if (solution := attempt(rod, field, Support())) and solution.centreline
     ]
     assert {True, False} == set(flags)
+
+
+def test_derivatives_near_magnets_are_the_slopes() -> None:
+    compared = 0
+    for rod, field in near_magnets(120):
+        if (found := attempt(rod, field, Support())) is None or not found.centreline:
+            continue
+        exact = sensitivities(rod, field, parameters=["load_factor", "gap_mm"])
+
+        def tips(step: float, rod=rod, field=field) -> list[np.ndarray]:
+            loads = [Support(load_factor=1.0 + k * step) for k in (-1, 1)]
+            gaps = [replace(field, gap_mm=field.gap_mm + k * step) for k in (-1, 1)]
+            lines = [solve(rod, field, support=load).centreline for load in loads]
+            lines += [solve(rod, gap).centreline for gap in gaps]
+            return [np.array(line.tip_mm) if line else np.nan for line in lines]
+
+        wide, fine = tips(2e-4), tips(1e-4)
+        for k in range(2):
+            first, last = 2 * k, 2 * k + 1
+            rough = (wide[last] - wide[first]) / 4e-4
+            slope = (fine[last] - fine[first]) / 2e-4
+            error = np.abs(slope - rough).max() / 3.0  # of second order
+            slope = slope + (slope - rough) / 3.0
+            here = np.array([exact.dx_mm[-1, k], exact.dy_mm[-1, k]])
+            if error < 1e-4 * np.abs(here).max():  # not at a fold
+                assert slope == pytest.approx(here, rel=1e-6, abs=1e-5 * error + 1e-6)
+                compared += 1
+    assert compared > 80
 
 
 def plain_rod(E_MPa: float) -> Specimen:
