@@ -163,10 +163,11 @@ def _bench_runs(paths: Sequence[Path], *, seed: int, workers: int) -> Iterator[P
                 future.result()
                 yield path
         except BaseException:
-            # After Ctrl-C or a failed bench nobody waits for the others.
+            # After Ctrl-C or a failed bench nobody waits for the others. Killed: a
+            # run that is asked to stop only ends its motion, then measures.
             pool.shutdown(wait=False, cancel_futures=True)
             for process in multiprocessing.active_children():
-                process.terminate()
+                process.kill()
             raise
 
 

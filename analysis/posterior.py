@@ -122,12 +122,17 @@ def sample_posterior(
     held = np.zeros(problem.size)
     scale = 1.0 / max(1.0, result.chi2_reduced)
 
+    stopped: list[KeyboardInterrupt] = []
+
     def log_probability(u: Array) -> float:
         held[:p] = u
         try:
             data = misfit(problem, held)
         except MagbendError:
             return -math.inf  # moduli for which nothing can be solved
+        except KeyboardInterrupt as stop:
+            stopped.append(stop)  # emcee would print a traceback; told below
+            return -math.inf
         seen = nuisance.T @ data
         chi2 = float(data @ data - seen @ inner @ seen) * scale
         return -0.5 * (chi2 + float(np.sum(((u - centre) / width) ** 2)))
@@ -140,6 +145,8 @@ def sample_posterior(
     sampler = emcee.EnsembleSampler(walkers, p, log_probability)
     sampler.random_state = np.random.RandomState(seed).get_state()
     for done, _ in enumerate(sampler.sample(start, iterations=steps), start=1):
+        if stopped:
+            raise stopped[0]
         progress(done, steps)
     chain = sampler.get_chain(discard=steps // 4, flat=True)
     return Posterior(
