@@ -1,4 +1,4 @@
-"""Path-traced photographs that were hard: deep shadows, curls, faces of clamps, tilt."""
+"""Hard path-traced photographs: deep shadows, curls, visible faces of clamps."""
 
 from __future__ import annotations
 
