@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .checks import finite, positive
+from .checks import finite, positive, size
 from .errors import InputError
 
 
@@ -37,10 +37,10 @@ class Section:
     remanence_mT: float | None = None
 
     def __post_init__(self) -> None:
-        positive(self.length_mm, "section length_mm", "mm")
-        positive(self.E_MPa, "section E_MPa", "MPa")
+        size(self.length_mm, "section length_mm", "mm")
+        size(self.E_MPa, "section E_MPa", "MPa")
         if self.side_mm is not None:
-            positive(self.side_mm, "section side_mm", "mm")
+            size(self.side_mm, "section side_mm", "mm")
         if self.remanence_mT is not None:
             finite(self.remanence_mT, "section remanence_mT", "mT")
 
@@ -75,7 +75,7 @@ class Specimen:
     density_kg_m3: float | None = None
 
     def __post_init__(self) -> None:
-        positive(self.side_mm, "side_mm", "mm")
+        size(self.side_mm, "side_mm", "mm")
         finite(self.remanence_mT, "remanence_mT", "mT")
         if self.density_kg_m3 is not None:
             positive(self.density_kg_m3, "density_kg_m3", "kg/m3")

@@ -19,11 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.centreline import Centreline
+from ..core.checks import whole
 from ..core.errors import InputError, SolverError
 from ..core.specimen import Specimen
 from ..core.units import MU0
 from .equilibria_march import ORDER, march, scan
-from .fields import STABLE, UNSTABLE, Support, UniformField
+from .fields import STABLE, UNSTABLE, Support, UniformField, check_case
 
 Array = NDArray[np.float64]
 
@@ -97,6 +98,12 @@ def planar_rod(specimen: Specimen, field: UniformField, support: Support) -> Pla
         If weight is asked for, the field does not act on the tip section, or the load
         is beyond what can be told apart from an infinite one.
     """
+    check_case(specimen, field, support)
+    if not isinstance(field, UniformField):
+        raise InputError(
+            "field must be a UniformField for the scan of all equilibria; instead "
+            f"received {field}"
+        )
     if any(support.gravity_m_s2):
         raise InputError(
             "gravity_m_s2 must be zero for the scan of all equilibria; instead "
@@ -168,6 +175,7 @@ def find_equilibria(
     >>> [(round(e.theta_tip_rad, 3), e.morse_index) for e in found]
     [(-4.596, 0), (-3.745, 1), (1.557, 0)]
     """
+    whole(points, 2, 1_000_000, "points")
     rod = planar_rod(specimen, field, support or Support())
     found = [
         equilibrium(rod, v, load=1.0, turn=turn, points=points)

@@ -8,9 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..core.centreline import Centreline
-from ..core.checks import finite, positive, within
+from ..core.checks import shown, size, vector, within
 from ..core.errors import InputError
 from ..core.magnet import Magnet
+from ..core.specimen import Specimen
 
 FLUX_LIMIT_T = 30.0
 """Fields and remanences above this are refused as mistaken units (mT for T)."""
@@ -71,7 +72,7 @@ class MagnetField:
     gap_mm: float
 
     def __post_init__(self) -> None:
-        positive(self.gap_mm, "gap_mm", "mm")
+        size(self.gap_mm, "gap_mm", "mm")
         within(
             self.magnet.remanence_T,
             -FLUX_LIMIT_T, FLUX_LIMIT_T, "magnet remanence_T", "T",
@@ -84,6 +85,30 @@ class MagnetField:
 
 
 Field = UniformField | MagnetField
+
+
+def check_case(specimen: object, field: object, support: object) -> None:
+    """Refuse what is no rod, no field or no support.
+
+    Raises
+    ------
+    InputError
+        If one is of another type.
+    """
+    if not isinstance(specimen, Specimen):
+        raise InputError(
+            "specimen must be a Specimen, as gmc(2) is; instead received "
+            f"{shown(specimen)}"
+        )
+    if not isinstance(field, (UniformField, MagnetField)):
+        raise InputError(
+            "field must be a UniformField in mT or a MagnetField in mm; instead "
+            f"received {shown(field)}"
+        )
+    if not isinstance(support, Support):
+        raise InputError(
+            f"support must be a Support; instead received {shown(support)}"
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,20 +138,8 @@ class Support:
 
     def __post_init__(self) -> None:
         within(self.clamp_angle_deg, -180.0, 180.0, "clamp_angle_deg", "deg")
-        if len(self.gravity_m_s2) != 3:
-            raise InputError(
-                "gravity_m_s2 must be three numbers (x, y, z) in m/s2; instead "
-                f"received {len(self.gravity_m_s2)}"
-            )
-        for value in self.gravity_m_s2:
-            within(
-                value, -GRAVITY_LIMIT_M_S2, GRAVITY_LIMIT_M_S2, "gravity_m_s2", "m/s2"
-            )
-        if finite(self.load_factor, "load_factor") < 0.0:
-            raise InputError(
-                "load_factor must be zero or above; instead received "
-                f"{self.load_factor!r}"
-            )
+        vector(self.gravity_m_s2, "gravity_m_s2", "m/s2", GRAVITY_LIMIT_M_S2)
+        within(self.load_factor, 0.0, 1e6, "load_factor", "")
 
     @property
     def in_plane(self) -> bool:

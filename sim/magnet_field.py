@@ -27,6 +27,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.checks import within
 from ..core.errors import InputError
 from ..core.jit import njit
 from ..core.magnet import Magnet
@@ -351,6 +352,8 @@ def magnet_gradient_mT_per_mm(
 def _table(
     magnet: Magnet, points_mm: ArrayLike, *, length_mm: float, gap_mm: float
 ) -> NDArray[np.float64]:
+    within(length_mm, 0.0, 1e9, "length_mm", "mm")
+    within(gap_mm, 0.0, 1e9, "gap_mm", "mm")
     points = np.asarray(points_mm, dtype=np.float64)
     if points.shape[-1:] != (3,) or not np.all(np.isfinite(points)):
         raise InputError(

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.checks import positive, within
+from ..core.checks import finite, positive, size, vector, within
 from ..core.errors import ConfigError, InputError
 from ..core.units import T_from_mT, mT_from_T
 
@@ -159,8 +159,9 @@ def fit_magnet(
         If a number cannot be, or there are fewer readings than unknowns.
     """
     gaps, flux, sd = _checked(gaps_mm, flux_mT, sd_mT, 2 if free_offset else 1)
+    vector(sides_mm, "magnet sides_mm", "mm")
     for side in sides_mm:
-        positive(side, "magnet side_mm", "mm")
+        size(side, "magnet side_mm", "mm")
     tolerance = positive(tolerance_percent, "tolerance_percent", "percent") / 100.0
     sigma = tolerance * np.abs(flux) if sd is None else sd
     offset = _best_offset(gaps, flux, sigma, sides_mm) if free_offset else 0.0
@@ -219,9 +220,11 @@ def _checked(
     sd_mT: Sequence[float] | None,
     unknowns: int,
 ) -> tuple[Array, Array, Array | None]:
-    gaps = np.asarray(gaps_mm, dtype=np.float64)
-    flux = np.asarray(flux_mT, dtype=np.float64)
-    sd = None if sd_mT is None else np.asarray(sd_mT, dtype=np.float64)
+    gaps = np.array([finite(value, "gap_mm", "mm") for value in gaps_mm])
+    flux = np.array([finite(value, "flux_mT", "mT") for value in flux_mT])
+    sd = None
+    if sd_mT is not None:
+        sd = np.array([finite(value, "sd_mT", "mT") for value in sd_mT])
     if (
         gaps.ndim != 1
         or gaps.shape != flux.shape
@@ -236,11 +239,11 @@ def _checked(
             f"the fit must have at least {unknowns} reading(s) of gap_mm and flux_mT; "
             f"instead received {len(gaps)}"
         )
-    if not np.all(np.isfinite(gaps)) or np.any(gaps <= 0.0):
+    if np.any(gaps <= 0.0):
         raise InputError(
             f"gap_mm must be above zero in mm; instead received {gaps.tolist()}"
         )
-    if not np.all(np.isfinite(flux)) or not (np.all(flux > 0.0) or np.all(flux < 0.0)):
+    if not (np.all(flux > 0.0) or np.all(flux < 0.0)):
         raise InputError(
             "flux_mT must be finite, not zero and of one sign in mT; instead received "
             f"{flux.tolist()}"
@@ -249,7 +252,13 @@ def _checked(
         within(float(gap), 0.0, 1e5, "gap_mm", "mm")
     for value in flux:
         within(float(value), -3e4, 3e4, "flux_mT", "mT")
-    if sd is not None and (not np.all(np.isfinite(sd)) or np.any(sd <= 0.0)):
+        if abs(value) < 1e-6:
+            raise InputError(
+                f"flux_mT must be above 1e-06 mT in size; instead received {value!r}"
+            )
+    for value in () if sd is None else sd:
+        size(float(value), "sd_mT", "mT")
+    if sd is not None and np.any(sd <= 0.0):
         raise InputError(
             f"sd_mT must be above zero in mT; instead received {sd.tolist()}"
         )

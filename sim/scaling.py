@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.checks import whole
 from ..core.errors import InputError
 from ..core.specimen import Specimen
 from ..core.units import MU0, T_from_mT, rad_from_deg
@@ -124,8 +125,4 @@ def stations(points: int) -> Array:
     InputError
         If there are fewer than 2 or more than a million.
     """
-    if not 2 <= points <= 1_000_000:
-        raise InputError(
-            f"points must be from 2 to 1000000; instead received {points!r}"
-        )
-    return np.linspace(0.0, 1.0, points)
+    return np.linspace(0.0, 1.0, whole(points, 2, 1_000_000, "points"))

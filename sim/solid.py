@@ -40,6 +40,7 @@ from .fields import (
     Solution,
     Support,
     UniformField,
+    check_case,
 )  # fmt: skip
 from .magnet_field import cuboid_flux
 from .planar import COARSE_ORDER as START_ORDER
@@ -142,6 +143,7 @@ def joint_turn(poisson_ratio: float, E_ratio: float) -> float:
     The factor 1.4 fits linear finite elements of two blocks at moduli 1 to 1.33, 1.5,
     2, 3 and 10 within 4 % of the turn of the clamp.
     """
+    within(E_ratio, 0.0, 1.0, "E_ratio", "")
     clamp = solid_constants(poisson_ratio).base_turn
     return clamp * (1.0 - E_ratio) ** 2 / (1.0 + 1.4 * E_ratio)
 
@@ -179,6 +181,7 @@ def solve_solid(
         If no answer was found that could be vouched for.
     """
     support = support or Support()
+    check_case(specimen, field, support)
     _refuse_spatial(field, support)
     held = _held(specimen, support, poisson_ratio)
     L = held.length_mm

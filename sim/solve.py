@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.centreline import Centreline
+from ..core.checks import shown
 from ..core.errors import InputError, SolverError
 from ..core.specimen import Specimen
 from ..core.units import mT_from_T, rad_from_deg
@@ -20,6 +21,7 @@ from .fields import (
     Solution,
     Support,
     UniformField,
+    check_case,
 )
 from .planar import GONE, ORDER, STEP, TOO_STRONG, TOUCHES, solve_planar
 from .planar_swing import swing_index
@@ -78,6 +80,7 @@ def solve(
     >>> [round(value, 5) for value in solution.centreline.tip_mm]
     [29.53532, 4.70952]
     """
+    check_case(specimen, field, support)
     if model == "solid":
         from .solid import solve_solid
 
@@ -85,7 +88,9 @@ def solve(
             specimen, field, support=support, poisson_ratio=poisson_ratio, points=points
         )
     if model != "rod":
-        raise InputError(f"model must be 'rod' or 'solid'; instead received {model!r}")
+        raise InputError(
+            f"model must be 'rod' or 'solid'; instead received {shown(model)}"
+        )
     if not (support.in_plane and (isinstance(field, UniformField) or field.in_plane)):
         from .spatial import solve_spatial
 

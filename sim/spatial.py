@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.centreline import Centreline
-from ..core.checks import within
+from ..core.checks import shown, vector
 from ..core.errors import InputError, SolverError
 from ..core.specimen import Specimen
 from ..core.units import mT_from_T, rad_from_deg
@@ -44,6 +44,9 @@ Array = NDArray[np.float64]
 
 REACH_LIMIT = 30.0
 """Largest sum of h sqrt(P / EI): beyond, a tip's pose no longer fixes the root's."""
+
+TURN_LIMIT = 300.0
+"""Largest turn of the unloaded rod, in rad."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -194,6 +197,11 @@ def _held(
     """Return the rod, its table for the kernels, and half its side over its length."""
     if isinstance(rod, Specimen):
         rod = SpatialRod.from_specimen(rod)
+    if not isinstance(rod, SpatialRod) or not isinstance(support, Support):
+        raise InputError(
+            "rod must be a SpatialRod or a Specimen and support a Support; instead "
+            f"received {shown(rod)} and {shown(support)}"
+        )
     sides = [min(part.width_mm, part.height_mm) for part in rod.sections]
     return rod, rod_table(rod, support), 0.5 * max(sides) / rod.length_mm
 
@@ -201,14 +209,14 @@ def _held(
 def _flux_array(field: Field | Sequence[float], length_mm: float) -> Array:
     if isinstance(field, (UniformField, MagnetField)):
         return field_array(field, length_mm)
-    if len(field) != 3:
+    if not isinstance(field, (tuple, list, np.ndarray)) or len(field) != 3:
         raise InputError(
             "field must be a UniformField, a MagnetField or three floats (x, y, z) in "
-            f"mT; instead received {len(field)} values"
+            f"mT; instead received {shown(field)}"
         )
-    limit_mT = FLUX_LIMIT_T * 1e3
+    vector(tuple(field), "flux_mT", "mT", FLUX_LIMIT_T * 1e3)
     out = np.zeros(1 + BLOCK_SIZE)
-    out[1:4] = [within(b, -limit_mT, limit_mT, "flux_mT", "mT") * 1e-3 for b in field]
+    out[1:4] = [float(b) * 1e-3 for b in field]
     return out
 
 
@@ -228,6 +236,11 @@ def _steps(table: Array, flux: Array, tip: Array) -> float:
             "E_MPa, remanence_mT and flux"
         )
     turns = float(np.linalg.norm(table[:, K1 : K3 + 1], axis=1) @ table[:, H])
+    if turns > TURN_LIMIT:
+        raise InputError(
+            "rest_curvature_per_mm must turn the whole rod by less than "
+            f"{TURN_LIMIT:g} rad; instead received {turns:.3g} rad"
+        )
     return 5.0 + 9.0 * reach + 4.0 * turns
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.checks import finite, positive, within
+from ..core.checks import positive, shown, size, vector, within
 from ..core.errors import InputError
 from ..core.specimen import Specimen
 from ..core.units import MU0
@@ -65,16 +65,13 @@ class SpatialSection:
     poisson_ratio: float = 0.49
 
     def __post_init__(self) -> None:
-        positive(self.length_mm, "section length_mm", "mm")
-        positive(self.E_MPa, "section E_MPa", "MPa")
-        positive(self.width_mm, "section width_mm", "mm")
-        positive(self.height_mm, "section height_mm", "mm")
+        size(self.length_mm, "section length_mm", "mm")
+        size(self.E_MPa, "section E_MPa", "MPa")
+        size(self.width_mm, "section width_mm", "mm")
+        size(self.height_mm, "section height_mm", "mm")
         within(self.poisson_ratio, -0.99, 0.5, "section poisson_ratio", "")
-        for value in self.remanence_mT:
-            limit_mT = FLUX_LIMIT_T * 1e3
-            within(value, -limit_mT, limit_mT, "section remanence_mT", "mT")
-        for value in self.rest_curvature_per_mm:
-            finite(value, "section rest_curvature_per_mm", "1/mm")
+        vector(self.remanence_mT, "section remanence_mT", "mT", FLUX_LIMIT_T * 1e3)
+        vector(self.rest_curvature_per_mm, "section rest_curvature_per_mm", "1/mm", 1e3)
 
     @property
     def area_mm2(self) -> float:
@@ -112,6 +109,11 @@ class SpatialRod:
     density_kg_m3: float | None = None
 
     def __post_init__(self) -> None:
+        if not isinstance(self.sections, tuple):
+            raise InputError(
+                "sections must be a tuple of SpatialSection; instead received "
+                f"{shown(self.sections)}"
+            )
         if len(self.sections) == 0:
             raise InputError(
                 "a spatial rod must have at least one section; instead received none"
