@@ -161,14 +161,14 @@ def _moved(angles: Array, s: Array, normals: Array) -> Array:
             out[i, k] = along[0, k] * u + along[1, k] * v
             along[0, k] += half * u
             along[1, k] += half * v
-    return np.asarray(out)
+    return out
 
 
 def _ramps(model: _Model, places: Array) -> Array:
     """Columns of a relative change of curvature beyond each place, (n, m)."""
     turned = model.angle[:, None] - np.interp(places, model.s, model.angle)
     beyond = np.where(model.s[:, None] > places, turned, 0.0)
-    return _moved(beyond, model.s, model.normals)
+    return np.asarray(_moved(beyond, model.s, model.normals))
 
 
 def _evidence(model: _Model, joints: list[float], places: Array) -> tuple[float, Array]:

@@ -83,7 +83,7 @@ def _mean(fits: Sequence[CurveFit], weights: Array) -> CurveFit:
         parts.append(np.sqrt(weight) * np.column_stack([item.root, away]))
     best = fits[int(np.argmax(weights))]
     # R R^T of all parts side by side, made triangular again.
-    upper = np.linalg.qr(np.hstack(parts)[::-1].T, mode="r")
+    upper = np.asarray(np.linalg.qr(np.hstack(parts)[::-1].T, mode="r"))
     return replace(
         best,
         curve=curve,
