@@ -21,7 +21,7 @@ from .tip import STEP_PX, EndFace, crossings_of, lanes, line_through
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 
-_LANES = 9
+_LANES = np.linspace(-0.5, 0.5, 9)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,7 +86,7 @@ def _face(
     grey: Image, curve: Curve, s: Array, expected: float, width: float, near: float,
     contrast: float, reach: float, sign: float,
 ) -> EndFace | None:  # fmt: skip
-    across = np.linspace(-0.3, 0.3, _LANES) * width
+    across = 0.6 * _LANES * width
     light = np.ascontiguousarray(lanes(grey, curve, s, across, sign)[:, ::-1])
     place = _steepest(light, -s[::-1], -expected, reach, 0.12 * contrast)
     if np.isnan(place):
@@ -100,7 +100,7 @@ def _front(
     grey: Image, curve: Curve, s: Array, expected: float, width: float, near: float,
     contrast: float, reach: float, sign: float,
 ) -> EndFace | None:  # fmt: skip
-    beside = np.linspace(0.5 * width + near + 3.0, 1.6 * width + near + 3.0, _LANES)
+    beside = (1.05 + 1.1 * _LANES) * width + near + 3.0
     crossings: list[float] = []
     offsets: list[float] = []
     for across in (-beside[::-1], beside):
@@ -110,7 +110,7 @@ def _front(
             continue
         crossings.extend(crossings_of(light, s, place, near, 3.0, 4.0, reach=4.0))
         offsets.extend(across)
-    if len(offsets) < _LANES:
+    if len(offsets) < len(_LANES):
         return None
     return line_through(np.array(offsets), np.array(crossings))
 

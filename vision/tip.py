@@ -21,9 +21,9 @@ Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 
 STEP_PX = 0.5
-_LANES = 13
 _SHARE = 0.62
 """Part of the width that the lanes cover: clear of blurred or rounded corners."""
+_LANES = np.linspace(-0.5, 0.5, 13) * _SHARE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,7 +132,7 @@ def find_tip(
         expected + reach + near + outer + STEP_PX,
         STEP_PX,
     )
-    across = middle + np.linspace(-0.5, 0.5, _LANES) * _SHARE * width
+    across = middle + _LANES * width
     light = lanes(grey, curve, s, across, sign)
     place = _rough_end(light[3:-3].mean(axis=0), s, expected, reach, near, inner)
     if place is None:
