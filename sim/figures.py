@@ -93,7 +93,10 @@ def draw_field_map(
     top = float(np.nanpercentile(size, 99.0))
     figure = _figure(6.0, 5.2)
     axes = figure.add_subplot()
-    levels = np.geomspace(top / 1e3, top, 25)
+    shown = size[np.isfinite(size)]
+    steps = np.outer(10.0 ** np.arange(-6, 6), (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)).ravel()
+    inner = (steps > float(shown.min())) & (steps < top)
+    levels = steps[max(int(np.argmax(inner)) - 1, 0) :][: int(inner.sum()) + 2]
     filled = axes.contourf(
         grid, grid, size, levels=levels, norm=LogNorm(), cmap="viridis", extend="both"
     )
@@ -111,7 +114,7 @@ def draw_field_map(
     axes.set_xlabel("across the axis in mm")
     axes.set_ylabel("along the axis in mm")
     axes.set_title(f"flux density, remanence {remanence_T:.4g} T", fontsize=10)
-    bar = figure.colorbar(filled, label="mT", format="%.3g")
+    bar = figure.colorbar(filled, label="mT", format="%g", ticks=levels)
     bar.ax.tick_params(labelsize=8)
     save(figure, path)
 
