@@ -29,6 +29,9 @@ STEP_PX = 0.5
 EDGE_LEVEL, SHADED_LEVEL = 0.27, 0.4
 """Where a rough edge is, from rod to paper, and from rod to shade right beside it."""
 
+_SHADE = 0.003
+"""Slope of the paper beside a rod, per px and contrast, that is no shade yet."""
+
 _ROOT_2PI = 2.5066282746310002
 
 
@@ -138,7 +141,7 @@ def find_edges(
         [_level_filter(strip.shape[1], before, gap, window, blur) for gap in gaps]
     )
     out = np.full((2, 5, len(points)), np.nan)
-    growth = np.zeros(len(points))
+    growth, certainty = np.zeros(len(points)), np.zeros(len(points))
     levels = np.empty((6, len(points)))
     for side, (outwards, edge) in enumerate(((-1.0, low), (1.0, high))):
         _sample(grey, points, normals, edge, outwards, before, np.float32(sign), strip)
@@ -148,9 +151,13 @@ def find_edges(
         out[side, 0] += outwards * edge
         out[side, 2:] = levels[3:]
         middle = 0.5 * (levels[0::3] + levels[1::3]) + levels[2::3] * blur / _ROOT_2PI
-        growth += 0.5 * (middle[1] - middle[0]) / out[side, 1]
+        sure = 1.0 / (levels[5] ** 2 + (_SHADE * (levels[4] - levels[3])) ** 2)
+        growth += sure * (middle[1] - middle[0]) / out[side, 1]
+        certainty += sure
     # Levels close to the edges know the shade and so the middle; those clear of the
-    # blur, whose shape is not quite a Gaussian's, know the width.
+    # blur, whose shape is not quite a Gaussian's, know the width, on a side without
+    # shade.
+    growth /= certainty
     out[:, 0] += np.where(np.abs(growth) < 0.5, growth, 0.0)
     return Edges(
         low=-out[0, 0], high=out[1, 0], slope_low=out[0, 1], slope_high=out[1, 1],

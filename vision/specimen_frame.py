@@ -29,14 +29,19 @@ SPREAD = 1.1
 systematic parts that the synthetic frames have: of sampling in pixels, and the share of
 a shade's pull that is left after the correction. A side face that is seen has another
 grey value than the top: `SIDE_FACE` of its width is in doubt."""
-SAMPLING_PX = 0.0025
-SHADE_LEFT = 0.22
+SAMPLING_PX = 0.002
+SHADE_LEFT = 0.17
 SIDE_FACE = 0.07
 THETA_PX = 0.003
 """Systematic part of a tangent angle, times the width: pixel sampling, as above."""
 CLAMP_PX = 0.03
-"""The same for the direction at the clamp, where shade and JPEG move the edges: as it
-was met on photograph-like scenes."""
+CLAMP_SHADE = 0.4
+CLAMP_REACH = 4.0
+CLAMP_PLACE_PX = 0.3
+"""The same for the direction at the clamp, where paper, JPEG and shade move the edges:
+of the shade's pull over so many widths beside the clamp, this share is left, and turns
+the rod within a width. A clamp whose place is so far off has the direction of another
+point of a bent rod."""
 UNKNOWN_CLAMP_MM = 5.0
 HIDDEN_MM = 0.05
 """A clamp of unknown height may rise so far above the rod's axis; and what part of the
@@ -222,7 +227,7 @@ def _in_frame(
         tip_mm=(float(own[-1, 0]), float(own[-1, 1])),
         tip_angle_deg=float(np.degrees(heading[-1] - heading[0])),
         width_mm=float(np.median(table["width_mm"][table["good"] > 0.5])),
-        clamp_angle_sd_deg=_clamp_sd_deg(table),
+        clamp_angle_sd_deg=_clamp_sd_deg(refined, table),
         length_px=float(s[-1] - s[0]),
         width_px=float(np.median(refined.width[refined.good])),
         clamp_px=(float(points[0, 0]), float(points[0, 1])),
@@ -231,10 +236,16 @@ def _in_frame(
     )
 
 
-def _clamp_sd_deg(table: dict[str, Array]) -> float:
+def _clamp_sd_deg(refined: Refined, table: dict[str, Array]) -> float:
     """Return the standard deviation of the direction at the clamp."""
-    own, width = table["sigma_theta_rad"][0], table["width_px"][0]
-    return float(np.degrees(np.hypot(own, CLAMP_PX / width)))
+    curve, width = refined.fit.curve, table["width_px"][0]
+    near = refined.shaded[refined.good & (curve.s < CLAMP_REACH * width)]
+    shade = float(np.sqrt(np.mean(near**2))) if near.size else 0.0
+    parts = (
+        table["sigma_theta_rad"][0], CLAMP_PX / width, CLAMP_SHADE * shade / width,
+        CLAMP_PLACE_PX * curve.kappa[0],
+    )  # fmt: skip
+    return float(np.degrees(np.linalg.norm(parts)))
 
 
 def _root(refined: Refined, ends: _Local, setting: Setting, side_mm: float) -> float:
