@@ -29,7 +29,8 @@ from ..core.jit import njit
 from ..core.specimen import Specimen
 from ..core.units import MU0, rad_from_deg
 from .fields import Field, MagnetField, Solution, Support, UniformField
-from .planar import ORDER, STEP, solve3, solve_planar
+from .planar import ORDER, STEP, solve_planar
+from .planar_follow import solve3
 from .planar_march import (
     PART,
     STATE,

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core.jit import njit
 from .magnet_field import inside
-from .planar import solve3
+from .planar_follow import solve3
 from .planar_march import jacobi
 from .solid_march import (
     END_ZONE,

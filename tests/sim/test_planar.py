@@ -27,7 +27,8 @@ from magbend.sim import (
     gmc,
     solve,
 )
-from magbend.sim.planar import GONE, newton, solve_planar, straight
+from magbend.sim.planar import GONE, solve_planar
+from magbend.sim.planar_follow import newton, straight
 from magbend.sim.planar_march import MAX_ORDER, STATE
 from magbend.sim.scaling import field_array, rod_array
 

@@ -29,7 +29,8 @@ from magbend.sim import (
 )
 from magbend.sim.check import check_solve
 from magbend.sim.fields import Field
-from magbend.sim.planar import GONE, OK_STABLE, follow_load, solve_planar
+from magbend.sim.planar import GONE, OK_STABLE, solve_planar
+from magbend.sim.planar_follow import follow_load
 from magbend.sim.planar_swing import swing_index
 from magbend.sim.scaling import field_array, rod_array, stations
 from magbend.sim.spatial import solve_spatial
