@@ -88,6 +88,19 @@ class Edges:
         )
         return median(rise) / _ROOT_2PI
 
+    def usable(self) -> NDArray[np.bool_]:
+        """Stations with both edges, of a width like the others'."""
+        away = np.abs(self.width - median(self.width))
+        return np.asarray(away < max(5.0 * 1.4826 * median(away), 0.6))
+
+    def shaded(self, blur: float) -> Array:
+        """Half the difference of what the paper's slope does to either edge, px."""
+        reach = 1.5 * max(1.5, 2.2 * blur)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            low = self.shade_low / self.slope_low
+            high = self.shade_high / self.slope_high
+        return np.nan_to_num(0.25 * reach * np.abs(high - low))
+
 
 def find_edges(
     grey: Image,

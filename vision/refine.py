@@ -162,7 +162,7 @@ def _pass(
     fit, used = _fit(state, seen, first, tip.s, joints, turn, clamped=root == "clamp")
     at = fit.curve.s + first
     smooth, sigma = _smooth_width(seen, at, state.width)
-    shaded = np.interp(at, seen.s, _shaded(seen.edges, state.blur))
+    shaded = np.interp(at, seen.s, seen.edges.shaded(state.blur))
     state.curve, state.half = fit.curve, 0.5 * smooth
     state.first, state.last = 0.0, float(fit.curve.s[-1])
     return Refined(
@@ -189,7 +189,7 @@ def _look(grey: Image, state: _State, sign: float, turn: int) -> _Seen:
         grey, points, normals, -half, half,
         reach=reach, blur=state.blur, fuzz=fuzz, sign=sign, smooth=int(6.0 / step),
     )  # fmt: skip
-    good = _usable(edges)
+    good = edges.usable()
     if good.sum() < max(8.0, 0.4 * len(good)):
         raise LostError(
             "edges_lost",
@@ -200,14 +200,6 @@ def _look(grey: Image, state: _State, sign: float, turn: int) -> _Seen:
     state.blur = float(np.clip(blur, 0.3, 0.5 * state.width)) if blur > 0 else 1.0
     state.scatter = _scatter(edges, int(5.0 / step))
     return _Seen(s, theta, edges, good)
-
-
-def _usable(edges: Edges) -> NDArray[np.bool_]:
-    """Stations with both edges, of a width like their neighbours'."""
-    width = edges.width
-    centre = median(width)
-    away = np.abs(width - centre)
-    return np.asarray(away < max(5.0 * 1.4826 * median(away), 0.6))
 
 
 def _scatter(edges: Edges, lag: int) -> float:
@@ -308,11 +300,7 @@ def _fit(
         raise LostError("edges_lost", "too few edges of the rod are seen")
     count = max(int((last - first) / max(_BIN_PX, (last - first) / _BINS)), 16)
     s = np.linspace(first, last, count + 1)
-    offset, within, weights = (
-        np.zeros(count + 1),
-        np.zeros(count + 1),
-        np.zeros(count + 1),
-    )
+    offset, within, weights = np.zeros((3, count + 1))
     _average(seen.s, seen.edges.middle, use, s, offset, within, weights)
     points, theta = state.curve.at(s)
     measured = points + offset[:, None] * np.column_stack(
@@ -398,15 +386,6 @@ def _smooth_width(seen: _Seen, at: Array, typical: float) -> tuple[Array, Array]
     scatter = 1.4826 * median(np.abs(width - mean)[good])
     sigma = scatter * np.sqrt(2.0 / np.maximum(count, 1.0))
     return np.interp(at, s, mean), np.interp(at, s, sigma)
-
-
-def _shaded(edges: Edges, blur: float) -> Array:
-    """Half the difference of what the paper's slope does to either edge."""
-    reach = 1.5 * max(1.5, 2.2 * blur)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        low = edges.shade_low / edges.slope_low
-        high = edges.shade_high / edges.slope_high
-    return np.nan_to_num(0.25 * reach * np.abs(high - low))
 
 
 def _shifted(lines: ClampLines, first: float) -> ClampLines:
