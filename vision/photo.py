@@ -22,6 +22,8 @@ from ..core.errors import VisionError
 
 MAX_PIXELS = 64_000_000
 MIN_SIDE = 16
+_BLOCK = 8
+"""Rows of a JPEG block."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -105,6 +107,8 @@ def decode_photo(data: bytes, *, source: str = "data", linear: bool = False) -> 
     pixels = _decode(data, source, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH)
     if data[:8] == _PNG and data[25] in (4, 6):
         pixels = _with_alpha(data, source, pixels)
+    if data[:2] == _JPEG and any(_is_torn(np.rot90(pixels, k)) for k in range(4)):
+        raise VisionError(_DAMAGED.format(source=source))
     return as_photo(pixels, source=source, linear=linear)
 
 
@@ -177,6 +181,8 @@ def as_photo(
 
 
 _PNG = b"\x89PNG\r\n\x1a\n"
+_JPEG = b"\xff\xd8"
+_DAMAGED = "{source}: the picture is cut off or damaged; copy it from the camera again"
 
 
 @cache
@@ -224,21 +230,31 @@ def _check_whole(data: bytes, source: str) -> None:
     """Refuse what decoders fill up with grey: PNG and JPEG files that are cut off."""
     if data[:8] == _PNG:
         size, whole = _png_size(data), _png_whole(data)
-    elif data[:2] == b"\xff\xd8":
+    elif data[:2] == _JPEG:
         size = _jpeg_size(data)
         whole = data.rfind(b"\xff\xd9") > data.rfind(b"\xff\xda") > 0
     else:
         return
     if size is None or not whole:
-        raise VisionError(
-            f"{source}: the picture is cut off or damaged; "
-            "copy it from the camera again"
-        )
+        raise VisionError(_DAMAGED.format(source=source))
     if size[0] * size[1] > MAX_PIXELS:
         raise VisionError(
             f"{source}: a photograph must have at most {MAX_PIXELS / 1e6:.0f} "
             f"megapixels; instead received {size[0]} x {size[1]} px"
         )
+
+
+def _is_torn(pixels: NDArray[Any]) -> bool:
+    """Whether noisy rows end in rows of one grey, with which decoders fill a loss.
+
+    A drawing may end so too, but is as flat above. EXIF may have turned the rows.
+    """
+    flat = pixels[-1, 0]
+    if np.any(pixels[-_BLOCK:] != flat) or flat in (0, np.iinfo(pixels.dtype).max):
+        return False
+    last = int(np.flatnonzero(np.any(pixels != flat, axis=1)).max(initial=0))
+    above = pixels[max(last - 8 * _BLOCK, 0) : max(last - _BLOCK, 0)]
+    return bool(above.size and np.mean(above[:, 1:] != above[:, :-1]) > 0.15)
 
 
 def _png_size(data: bytes) -> tuple[int, int] | None:

@@ -122,6 +122,26 @@ def test_what_is_no_picture_is_named(data, says):
         decode_photo(data, source="scan.png")
 
 
+def jpeg(pixels):
+    return cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, 85])[1].tobytes()
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
+def test_a_loss_that_a_jpeg_hides_behind_its_end_marker_is_refused(share):
+    noisy = np.random.default_rng(0).normal(180.0, 2.0, (240, 320))
+    data = jpeg(noisy.round().astype(np.uint8))
+    decode_photo(data)
+    with pytest.raises(VisionError, match="cut off or damaged"):
+        decode_photo(data[: int(share * len(data))] + b"\xff\xd9")
+
+
+def test_a_drawing_that_ends_flat_is_whole():
+    drawing = np.full((240, 320), 200, np.uint8)
+    cv2.line(drawing, (100, 0), (130, 150), 30, 12)
+    decode_photo(jpeg(drawing))
+    decode_photo(jpeg(cv2.rotate(drawing, cv2.ROTATE_90_CLOCKWISE)))
+
+
 def test_missing_file_and_folder_are_named(tmp_path):
     with pytest.raises(VisionError, match="no such file"):
         read_photo(tmp_path / "absent.png")
