@@ -13,7 +13,12 @@ import pytest
 from PIL import Image
 
 from magbend.core.errors import VisionError
-from magbend.vision.batch import Settings, extract_files, read_bare
+from magbend.vision.batch import (
+    Settings,
+    _single_threaded_children,
+    extract_files,
+    read_bare,
+)
 from magbend.vision.calibration import scale_calibration
 from magbend.vision.measurement import POINT_COLUMNS, failure
 from magbend.vision.overlay import draw_overlay
@@ -433,3 +438,13 @@ def test_overlay_draws_the_axis_where_the_rod_is(tmp_path, good):
     )
     assert len(x) > 300
     assert np.abs(distance).max() < 3.0
+
+
+def test_workers_keep_to_one_core_and_this_process_to_its_own_settings(monkeypatch):
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "7")
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    with _single_threaded_children():
+        assert os.environ["OPENBLAS_NUM_THREADS"] == "1"
+        assert os.environ["OMP_NUM_THREADS"] == "1"
+    assert os.environ["OPENBLAS_NUM_THREADS"] == "7"
+    assert "OMP_NUM_THREADS" not in os.environ

@@ -55,6 +55,23 @@ def test_shade_on_one_side_does_not_pull_the_midline():
     assert np.nanmedian(edges.shade_high) == pytest.approx(0.0225, rel=0.2)
 
 
+def test_hairs_along_the_edges_cost_no_width():
+    """Edges that wander by a pixel, as a yarn's: levels are taken clear of that."""
+    image, points, normals = bar(0.0, 15.0, 1.0)
+    shifts = np.random.default_rng(0).integers(-2, 3, size=(2, image.shape[1]))
+    rows = np.arange(120)
+    for column, (upper, lower) in enumerate(shifts.T):
+        image[:120, column] = image[np.clip(rows - upper, 0, 119), column]
+        image[120:, column] = image[120 + np.clip(rows - lower, 0, 119), column]
+    expected = np.full(len(points), 15.0)
+    edges = find_edges(
+        image, points, normals, -expected, expected, reach=8.0, blur=1.0, fuzz=4.0
+    )
+    assert np.isfinite(edges.width).mean() > 0.95
+    true = 30.0 + (shifts[1] - shifts[0])[points[:, 0].astype(int)]
+    assert np.nanmean(edges.width - true) == pytest.approx(0.0, abs=0.1)
+
+
 def test_light_bars_are_dark_bars_inverted():
     image, points, normals = bar(0.4, 7.0, 1.0)
     expected = np.full(len(points), 7.0)
