@@ -254,7 +254,8 @@ def _is_torn(pixels: NDArray[Any]) -> bool:
         return False
     last = int(np.flatnonzero(np.any(pixels != flat, axis=1)).max(initial=0))
     above = pixels[max(last - 8 * _BLOCK, 0) : max(last - _BLOCK, 0)]
-    return bool(above.size and np.mean(above[:, 1:] != above[:, :-1]) > 0.15)
+    blocks = above[:, : above.shape[1] // _BLOCK * _BLOCK].reshape(-1, _BLOCK)
+    return bool(blocks.size and np.mean(np.ptp(blocks, axis=1) > 0) > 0.3)
 
 
 def _png_size(data: bytes) -> tuple[int, int] | None:
