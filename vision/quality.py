@@ -16,6 +16,9 @@ from .tip import lanes
 
 LENGTH_TOLERANCE = 0.02
 
+TURN_MM = 0.15
+"""What the standard deviation of the direction at the clamp may do to the tip."""
+
 SHADE_PX = 0.04
 """Pull of a shade on the midline, before correction, above which it is named."""
 
@@ -66,6 +69,8 @@ def doubts(
         flags.append("root_hidden")
     if candidate.root == "clamp" and _goes_on(photo, refined):
         flags.append("clamp_doubtful")
+    if np.radians(result.clamp_angle_sd_deg) * result.length_mm > TURN_MM:
+        flags.append("direction_doubtful")
     if photo.clipped > 0.01:
         flags.append("overexposed")
     if quantile(refined.shaded[refined.good], 0.9) > SHADE_PX:

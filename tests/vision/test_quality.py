@@ -9,16 +9,18 @@ import numpy as np
 from magbend.vision import as_photo
 from magbend.vision.binarise import binarise
 from magbend.vision.curve import Curve
-from magbend.vision.quality import _goes_on
+from magbend.vision.measurement import Measurement
+from magbend.vision.quality import _goes_on, doubts
 from magbend.vision.refine import refine
 from magbend.vision.rod import find_candidates
+from magbend.vision.specimen_frame import Setting
 from magbend.vision.synthetic import curve, draw
 from magbend.vision.track import start_curve
 
 
-def test_root_put_short_of_the_clamp_is_doubted():
+def measured(seed=0):
     frame = draw(
-        curve("arc", angle_deg=70.0), np.random.default_rng(0), size_px=(1200, 1000)
+        curve("arc", angle_deg=70.0), np.random.default_rng(seed), size_px=(1200, 1000)
     )
     photo = as_photo(frame.image)
     binary = binarise(photo.grey)
@@ -28,7 +30,11 @@ def test_root_put_short_of_the_clamp_is_doubted():
         photo.grey, rod.points_px, rod.width_px, sign=1.0, follow=True
     )  # fmt: skip
     assert start is not None
-    refined = refine(photo.grey, start, root=rod.root, sign=1.0)
+    return photo, rod, refine(photo.grey, start, root=rod.root, sign=1.0)
+
+
+def test_root_put_short_of_the_clamp_is_doubted():
+    photo, _, refined = measured()
     assert not _goes_on(photo, refined)
     whole = refined.fit.curve
     short = Curve(
@@ -36,3 +42,20 @@ def test_root_put_short_of_the_clamp_is_doubted():
         theta=whole.theta[60:], kappa=whole.kappa[60:],
     )  # fmt: skip
     assert _goes_on(photo, replace(refined, fit=replace(refined.fit, curve=short)))
+
+
+def test_direction_that_leaves_the_tip_unsure_is_doubted():
+    photo, rod, refined = measured()
+    setting = Setting(
+        calibration=None, rod_height_mm=0.0, joints_mm=(), length_mm=None,
+        clamp_height_mm=None,
+    )  # fmt: skip
+
+    def flags(sd_deg):
+        line = Measurement(
+            status="ok", length_mm=30.0, width_px=20.0, clamp_angle_sd_deg=sd_deg
+        )
+        return doubts(line, photo, refined, rod, setting).flags
+
+    assert "direction_doubtful" not in flags(0.25)  # 0.13 mm at the tip
+    assert "direction_doubtful" in flags(0.35)  # 0.18 mm
