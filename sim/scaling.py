@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from collections.abc import Callable
+from functools import lru_cache, wraps
+from typing import ParamSpec
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,29 @@ from .magnet_field import BLOCK_SIZE, magnet_block
 from .planar_march import CUBOID, UNIFORM
 
 Array = NDArray[np.float64]
+P = ParamSpec("P")
+
+MOST_POINTS = 1_000_000
+"""Of one shape."""
+
+
+def array_cache(maxsize: int) -> Callable[[Callable[P, Array]], Callable[P, Array]]:
+    """Keep the arrays that a function returns, and hand out copies.
+
+    A caller may write into his copy. Handing out the array itself, read-only, would
+    make numba compile every kernel once more, for another type.
+    """
+
+    def decorate(function: Callable[P, Array]) -> Callable[P, Array]:
+        kept = lru_cache(maxsize)(function)
+
+        @wraps(function)
+        def copy(*args: P.args, **kwargs: P.kwargs) -> Array:
+            return kept(*args, **kwargs).copy()  # type: ignore[arg-type]
+
+        return copy
+
+    return decorate
 
 
 @lru_cache(maxsize=256)
@@ -27,7 +52,7 @@ def stiffness_Nmm2(specimen: Specimen) -> tuple[float, ...]:
     )
 
 
-@lru_cache(maxsize=256)
+@array_cache(maxsize=256)
 def rod_array(specimen: Specimen, support: Support) -> Array:
     """Return the rod as the kernels take it, tip first (see `planar_march`).
 
@@ -90,7 +115,7 @@ def checked_density(specimen: Specimen, support: Support) -> float:
     return specimen.density_kg_m3
 
 
-@lru_cache(maxsize=1024)
+@array_cache(maxsize=1024)
 def field_array(field: Field, length_mm: float) -> Array:
     """Return the field as the kernels take it (see `planar_march`)."""
     out = np.zeros(1 + BLOCK_SIZE)
@@ -116,7 +141,7 @@ def field_array(field: Field, length_mm: float) -> Array:
     return out
 
 
-@lru_cache(maxsize=64)
+@array_cache(maxsize=64)
 def stations(points: int) -> Array:
     """Return `points` stations from 0 to 1.
 
@@ -125,4 +150,4 @@ def stations(points: int) -> Array:
     InputError
         If there are fewer than 2 or more than a million.
     """
-    return np.linspace(0.0, 1.0, whole(points, 2, 1_000_000, "points"))
+    return np.linspace(0.0, 1.0, whole(points, 2, MOST_POINTS, "points"))
