@@ -6,6 +6,7 @@ import math
 import operator
 import reprlib
 from collections.abc import Sequence
+from typing import Any, SupportsFloat
 
 from .errors import InputError
 
@@ -15,18 +16,21 @@ def shown(value: object) -> str:
     return reprlib.repr(value)
 
 
-def finite(value: float, quantity: str, unit: str = "") -> float:
+def finite(value: SupportsFloat, quantity: str, unit: str = "") -> float:
     """Return `value` as a float.
+
+    Parameters
+    ----------
+    value : real number
+        Of Python or numpy, or an array without dimensions. Text is refused, even if
+        it reads as a number.
 
     Raises
     ------
     InputError
         If it is not a finite number.
     """
-    try:
-        number = float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
+    number = value if type(value) is float else _real(value)
     if not math.isfinite(number):
         raise InputError(
             f"{quantity} must be a finite number{_in(unit)}; instead received "
@@ -35,7 +39,20 @@ def finite(value: float, quantity: str, unit: str = "") -> float:
     return number
 
 
-def positive(value: float, quantity: str, unit: str = "") -> float:
+def _real(value: object) -> float:
+    """Return a real number as a float, and NaN for whatever else."""
+    if getattr(value, "ndim", None) == 0 and hasattr(value, "item"):
+        # Numpy's numbers, of which complex ones would drop a part with a warning.
+        value = value.item()
+    if not hasattr(value, "__float__") or getattr(value, "ndim", 0) != 0:
+        return math.nan
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
+
+
+def positive(value: SupportsFloat, quantity: str, unit: str = "") -> float:
     """Return `value` as a float above zero.
 
     Raises
@@ -51,7 +68,9 @@ def positive(value: float, quantity: str, unit: str = "") -> float:
     return number
 
 
-def within(value: float, low: float, high: float, quantity: str, unit: str) -> float:
+def within(
+    value: SupportsFloat, low: float, high: float, quantity: str, unit: str
+) -> float:
     """Return `value` as a float between `low` and `high`, ends included.
 
     Raises
@@ -68,7 +87,7 @@ def within(value: float, low: float, high: float, quantity: str, unit: str) -> f
     return number
 
 
-def size(value: float, quantity: str, unit: str) -> float:
+def size(value: SupportsFloat, quantity: str, unit: str) -> float:
     """Return `value` as a float above zero and within reach of the arithmetic.
 
     Raises
@@ -81,24 +100,36 @@ def size(value: float, quantity: str, unit: str) -> float:
 
 
 def vector(
-    values: Sequence[float], quantity: str, unit: str = "", limit: float = math.inf
-) -> None:
-    """Refuse what is not three finite numbers (x, y, z).
+    values: Sequence[float],
+    quantity: str,
+    unit: str = "",
+    limit: float = math.inf,
+) -> tuple[float, float, float]:
+    """Return three numbers (x, y, z) as a tuple of floats.
+
+    Parameters
+    ----------
+    values : sequence of three real numbers
+        A tuple, a list, a numpy array.
 
     Raises
     ------
     InputError
-        If it is not, or a number is beyond +-`limit`.
+        If it is not, or a number is not finite or beyond +-`limit`.
     """
-    if not isinstance(values, (tuple, list)) or len(values) != 3:
+    given = values.tolist() if hasattr(values, "tolist") else values
+    if not isinstance(given, Sequence) or isinstance(given, (str, bytes)):
+        given = ()
+    if len(given) != 3:
         raise InputError(
             f"{quantity} must be three numbers (x, y, z){_in(unit)}; instead received "
             f"{shown(values)}"
         )
-    for value in values:
-        finite(value, quantity, unit)
-        if limit < math.inf:
+    x, y, z = (finite(value, quantity, unit) for value in given)
+    if limit < math.inf:
+        for value in (x, y, z):
             within(value, -limit, limit, quantity, unit)
+    return x, y, z
 
 
 def whole(value: int, low: int, high: int, quantity: str) -> int:
@@ -118,6 +149,22 @@ def whole(value: int, low: int, high: int, quantity: str) -> int:
             f"{quantity} must be from {low} to {high}; instead received {shown(value)}"
         )
     return number
+
+
+def listed(values: object) -> tuple[Any, ...] | None:
+    """Return what a sequence holds; None for text and for what is no sequence."""
+    if isinstance(values, (str, bytes)):
+        return None
+    try:
+        return tuple(values)  # type: ignore[arg-type]
+    except TypeError:
+        return None
+
+
+def store(record: object, **values: object) -> None:
+    """Set fields of a frozen dataclass, for its `__post_init__`."""
+    for name, value in values.items():
+        object.__setattr__(record, name, value)
 
 
 def _in(unit: str) -> str:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from .checks import finite, size, vector
+from .checks import finite, size, store, vector
 
 Vector = tuple[float, float, float]
 
@@ -48,13 +48,17 @@ class Magnet:
     offset_mm: Vector = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        vector(self.sides_mm, "magnet sides_mm", "mm")
-        for side in self.sides_mm:
+        sides = vector(self.sides_mm, "magnet sides_mm", "mm")
+        for side in sides:
             size(side, "magnet side_mm", "mm")
-        finite(self.remanence_T, "magnet remanence_T", "T")
-        finite(self.axis_angle_deg, "magnet axis_angle_deg", "deg")
-        finite(self.elevation_deg, "magnet elevation_deg", "deg")
-        vector(self.offset_mm, "magnet offset_mm", "mm", 1e9)
+        store(
+            self,
+            sides_mm=sides,
+            remanence_T=finite(self.remanence_T, "magnet remanence_T", "T"),
+            axis_angle_deg=finite(self.axis_angle_deg, "magnet axis_angle_deg", "deg"),
+            elevation_deg=finite(self.elevation_deg, "magnet elevation_deg", "deg"),
+            offset_mm=vector(self.offset_mm, "magnet offset_mm", "mm", 1e9),
+        )
 
     @classmethod
     def cube(cls, side_mm: float, remanence_T: float, **pose: float) -> Magnet:

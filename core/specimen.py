@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
-from .checks import finite, positive, size
+from .checks import finite, listed, positive, shown, size, store
 from .errors import InputError
 
 
@@ -37,12 +38,41 @@ class Section:
     remanence_mT: float | None = None
 
     def __post_init__(self) -> None:
-        size(self.length_mm, "section length_mm", "mm")
-        size(self.E_MPa, "section E_MPa", "MPa")
+        store(
+            self,
+            length_mm=size(self.length_mm, "section length_mm", "mm"),
+            E_MPa=size(self.E_MPa, "section E_MPa", "MPa"),
+        )
         if self.side_mm is not None:
-            size(self.side_mm, "section side_mm", "mm")
+            store(self, side_mm=size(self.side_mm, "section side_mm", "mm"))
         if self.remanence_mT is not None:
-            finite(self.remanence_mT, "section remanence_mT", "mT")
+            remanence = finite(self.remanence_mT, "section remanence_mT", "mT")
+            store(self, remanence_mT=remanence)
+
+
+Part = TypeVar("Part")
+
+
+def parts(given: object, kind: type[Part], whose: str) -> tuple[Part, ...]:
+    """Return the sections of a rod, in any sequence, as a tuple.
+
+    Raises
+    ------
+    InputError
+        If there is none, or something that is no section of this `kind`.
+    """
+    sections = listed(given)
+    if not sections:
+        raise InputError(
+            f"{whose} must have at least one section; instead received {shown(given)}"
+        )
+    for section in sections:
+        if not isinstance(section, kind):
+            raise InputError(
+                f"sections of {whose} must each be a {kind.__name__}; instead received "
+                f"{shown(section)}"
+            )
+    return sections
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,15 +105,15 @@ class Specimen:
     density_kg_m3: float | None = None
 
     def __post_init__(self) -> None:
-        size(self.side_mm, "side_mm", "mm")
-        finite(self.remanence_mT, "remanence_mT", "mT")
+        store(
+            self,
+            side_mm=size(self.side_mm, "side_mm", "mm"),
+            remanence_mT=finite(self.remanence_mT, "remanence_mT", "mT"),
+            sections=parts(self.sections, Section, f"specimen {self.name!r}"),
+        )
         if self.density_kg_m3 is not None:
-            positive(self.density_kg_m3, "density_kg_m3", "kg/m3")
-        if len(self.sections) == 0:
-            raise InputError(
-                f"specimen {self.name!r} must have at least one section; "
-                f"instead received none"
-            )
+            density = positive(self.density_kg_m3, "density_kg_m3", "kg/m3")
+            store(self, density_kg_m3=density)
 
     @property
     def length_mm(self) -> float:

@@ -175,7 +175,7 @@ def find_equilibria(
     >>> [(round(e.theta_tip_rad, 3), e.morse_index) for e in found]
     [(-4.596, 0), (-3.745, 1), (1.557, 0)]
     """
-    whole(points, 2, 1_000_000, "points")
+    points = whole(points, 2, 1_000_000, "points")
     rod = planar_rod(specimen, field, support or Support())
     found = [
         equilibrium(rod, v, load=1.0, turn=turn, points=points)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..core.centreline import Centreline
-from ..core.checks import shown, size, vector, within
+from ..core.checks import shown, size, store, vector, within
 from ..core.errors import InputError
 from ..core.magnet import Magnet
 from ..core.specimen import Specimen
@@ -46,8 +46,11 @@ class UniformField:
 
     def __post_init__(self) -> None:
         limit_mT = FLUX_LIMIT_T * 1e3
-        within(self.flux_mT, -limit_mT, limit_mT, "flux_mT", "mT")
-        within(self.angle_deg, -36000.0, 36000.0, "angle_deg", "deg")
+        store(
+            self,
+            flux_mT=within(self.flux_mT, -limit_mT, limit_mT, "flux_mT", "mT"),
+            angle_deg=within(self.angle_deg, -36000.0, 36000.0, "angle_deg", "deg"),
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,7 +75,12 @@ class MagnetField:
     gap_mm: float
 
     def __post_init__(self) -> None:
-        size(self.gap_mm, "gap_mm", "mm")
+        if not isinstance(self.magnet, Magnet):
+            raise InputError(
+                "magnet must be a Magnet, as Magnet.cube(55.0, 1.3) in mm and T is; "
+                f"instead received {shown(self.magnet)}"
+            )
+        store(self, gap_mm=size(self.gap_mm, "gap_mm", "mm"))
         within(
             self.magnet.remanence_T,
             -FLUX_LIMIT_T, FLUX_LIMIT_T, "magnet remanence_T", "T",
@@ -137,9 +145,10 @@ class Support:
     load_factor: float = 1.0
 
     def __post_init__(self) -> None:
-        within(self.clamp_angle_deg, -180.0, 180.0, "clamp_angle_deg", "deg")
-        vector(self.gravity_m_s2, "gravity_m_s2", "m/s2", GRAVITY_LIMIT_M_S2)
-        within(self.load_factor, 0.0, 1e6, "load_factor", "")
+        clamp = within(self.clamp_angle_deg, -180.0, 180.0, "clamp_angle_deg", "deg")
+        gravity = vector(self.gravity_m_s2, "gravity_m_s2", "m/s2", GRAVITY_LIMIT_M_S2)
+        load = within(self.load_factor, 0.0, 1e6, "load_factor", "")
+        store(self, clamp_angle_deg=clamp, gravity_m_s2=gravity, load_factor=load)
 
     @property
     def in_plane(self) -> bool:

@@ -27,7 +27,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..core.checks import within
+from ..core.arrays import real_array
+from ..core.checks import shown, within
 from ..core.errors import InputError
 from ..core.jit import njit
 from ..core.magnet import Magnet
@@ -352,12 +353,14 @@ def magnet_gradient_mT_per_mm(
 def _table(
     magnet: Magnet, points_mm: ArrayLike, *, length_mm: float, gap_mm: float
 ) -> NDArray[np.float64]:
-    within(length_mm, 0.0, 1e9, "length_mm", "mm")
-    within(gap_mm, 0.0, 1e9, "gap_mm", "mm")
-    points = np.asarray(points_mm, dtype=np.float64)
-    if points.shape[-1:] != (3,) or not np.all(np.isfinite(points)):
+    if not isinstance(magnet, Magnet):
+        raise InputError(f"magnet must be a Magnet; instead received {shown(magnet)}")
+    length_mm = within(length_mm, 0.0, 1e9, "length_mm", "mm")
+    gap_mm = within(gap_mm, 0.0, 1e9, "gap_mm", "mm")
+    points = real_array(points_mm, "points_mm", "mm")
+    if points.shape[-1:] != (3,) or np.any(np.abs(points) > 1e9):
         raise InputError(
-            "points_mm must be finite positions (x, y, z) in mm; instead received "
+            "points_mm must be positions (x, y, z) within 1e+09 mm; instead received "
             f"an array of shape {points.shape}"
         )
     flat = np.ascontiguousarray(points.reshape(-1, 3))

@@ -183,7 +183,8 @@ def solve_solid(
     support = support or Support()
     check_case(specimen, field, support)
     _refuse_spatial(field, support)
-    held = _held(specimen, support, poisson_ratio)
+    ratio = within(poisson_ratio, 0.0, 0.5, "poisson_ratio", "")
+    held = _held(specimen, support, ratio)
     L = held.length_mm
     flux = field_array(field, L)
     clamp = rad_from_deg(support.clamp_angle_deg)

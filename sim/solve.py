@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.centreline import Centreline
-from ..core.checks import shown
+from ..core.checks import shown, whole
 from ..core.errors import InputError, SolverError
 from ..core.specimen import Specimen
 from ..core.units import mT_from_T, rad_from_deg
@@ -25,7 +25,7 @@ from .fields import (
 )
 from .planar import GONE, ORDER, STEP, TOO_STRONG, TOUCHES, solve_planar
 from .planar_swing import swing_index
-from .scaling import field_array, rod_array, stations, stiffness_Nmm2
+from .scaling import MOST_POINTS, field_array, rod_array, stations, stiffness_Nmm2
 
 Array = NDArray[np.float64]
 STATUS = (STABLE, UNSTABLE, PULLED_IN)
@@ -81,15 +81,16 @@ def solve(
     [29.53532, 4.70952]
     """
     check_case(specimen, field, support)
+    points = whole(points, 2, MOST_POINTS, "points")
+    if not isinstance(model, str) or model not in ("rod", "solid"):
+        raise InputError(
+            f"model must be 'rod' or 'solid'; instead received {shown(model)}"
+        )
     if model == "solid":
         from .solid import solve_solid
 
         return solve_solid(
             specimen, field, support=support, poisson_ratio=poisson_ratio, points=points
-        )
-    if model != "rod":
-        raise InputError(
-            f"model must be 'rod' or 'solid'; instead received {shown(model)}"
         )
     if not (support.in_plane and (isinstance(field, UniformField) or field.in_plane)):
         from .spatial import solve_spatial

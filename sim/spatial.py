@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.centreline import Centreline
-from ..core.checks import shown, vector
+from ..core.checks import shown, vector, whole
 from ..core.errors import InputError, SolverError
 from ..core.specimen import Specimen
 from ..core.units import mT_from_T, rad_from_deg
@@ -33,7 +33,7 @@ from .fields import (
     UniformField,
 )
 from .magnet_field import BLOCK_SIZE
-from .scaling import field_array, stations
+from .scaling import MOST_POINTS, field_array, stations
 from .spatial_march import AXIAL, C1, C3, K1, K3, MU1, WX, WZ, H, flux_at
 from .spatial_rod import SpatialRod, SpatialSection, Vector, rod_table
 from .spatial_solve import shape, solve_pose, touches
@@ -166,6 +166,12 @@ def solve_spatial(
     [29.53532, 4.70952, 0.0]
     """
     support = support or Support()
+    if not isinstance(rod, (SpatialRod, Specimen)) or not isinstance(support, Support):
+        raise InputError(
+            "rod must be a SpatialRod or a Specimen and support a Support; instead "
+            f"received {shown(rod)} and {shown(support)}"
+        )
+    points = whole(points, 2, MOST_POINTS, "points")
     rod, table, margin = _held(rod, support)
     L = rod.length_mm
     flux = _flux_array(field, L)
@@ -197,11 +203,6 @@ def _held(
     """Return the rod, its table for the kernels, and half its side over its length."""
     if isinstance(rod, Specimen):
         rod = SpatialRod.from_specimen(rod)
-    if not isinstance(rod, SpatialRod) or not isinstance(support, Support):
-        raise InputError(
-            "rod must be a SpatialRod or a Specimen and support a Support; instead "
-            f"received {shown(rod)} and {shown(support)}"
-        )
     sides = [min(part.width_mm, part.height_mm) for part in rod.sections]
     return rod, rod_table(rod, support), 0.5 * max(sides) / rod.length_mm
 
@@ -214,9 +215,9 @@ def _flux_array(field: Field | Sequence[float], length_mm: float) -> Array:
             "field must be a UniformField, a MagnetField or three floats (x, y, z) in "
             f"mT; instead received {shown(field)}"
         )
-    vector(tuple(field), "flux_mT", "mT", FLUX_LIMIT_T * 1e3)
+    flux_mT = vector(field, "flux_mT", "mT", FLUX_LIMIT_T * 1e3)
     out = np.zeros(1 + BLOCK_SIZE)
-    out[1:4] = [float(b) * 1e-3 for b in field]
+    out[1:4] = np.array(flux_mT) * 1e-3
     return out
 
 

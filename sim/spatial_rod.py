@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.checks import positive, shown, size, vector, within
+from ..core.checks import positive, size, store, vector, within
 from ..core.errors import InputError
-from ..core.specimen import Specimen
+from ..core.specimen import Specimen, parts
 from ..core.units import MU0
 from .fields import FLUX_LIMIT_T, Support
 from .spatial_march import (
@@ -65,13 +65,22 @@ class SpatialSection:
     poisson_ratio: float = 0.49
 
     def __post_init__(self) -> None:
-        size(self.length_mm, "section length_mm", "mm")
-        size(self.E_MPa, "section E_MPa", "MPa")
-        size(self.width_mm, "section width_mm", "mm")
-        size(self.height_mm, "section height_mm", "mm")
-        within(self.poisson_ratio, -0.99, 0.5, "section poisson_ratio", "")
-        vector(self.remanence_mT, "section remanence_mT", "mT", FLUX_LIMIT_T * 1e3)
-        vector(self.rest_curvature_per_mm, "section rest_curvature_per_mm", "1/mm", 1e3)
+        limit_mT = FLUX_LIMIT_T * 1e3
+        remanence = vector(self.remanence_mT, "section remanence_mT", "mT", limit_mT)
+        rest = vector(
+            self.rest_curvature_per_mm, "section rest_curvature_per_mm", "1/mm", 1e3
+        )
+        ratio = within(self.poisson_ratio, -0.99, 0.5, "section poisson_ratio", "")
+        store(
+            self,
+            length_mm=size(self.length_mm, "section length_mm", "mm"),
+            E_MPa=size(self.E_MPa, "section E_MPa", "MPa"),
+            width_mm=size(self.width_mm, "section width_mm", "mm"),
+            height_mm=size(self.height_mm, "section height_mm", "mm"),
+            remanence_mT=remanence,
+            rest_curvature_per_mm=rest,
+            poisson_ratio=ratio,
+        )
 
     @property
     def area_mm2(self) -> float:
@@ -109,17 +118,10 @@ class SpatialRod:
     density_kg_m3: float | None = None
 
     def __post_init__(self) -> None:
-        if not isinstance(self.sections, tuple):
-            raise InputError(
-                "sections must be a tuple of SpatialSection; instead received "
-                f"{shown(self.sections)}"
-            )
-        if len(self.sections) == 0:
-            raise InputError(
-                "a spatial rod must have at least one section; instead received none"
-            )
+        store(self, sections=parts(self.sections, SpatialSection, "a spatial rod"))
         if self.density_kg_m3 is not None:
-            positive(self.density_kg_m3, "density_kg_m3", "kg/m3")
+            density = positive(self.density_kg_m3, "density_kg_m3", "kg/m3")
+            store(self, density_kg_m3=density)
 
     @property
     def length_mm(self) -> float:
