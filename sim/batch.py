@@ -17,13 +17,15 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.checks import shown, whole
 from ..core.errors import InputError
 from ..core.jit import njit
 from ..core.magnet import Magnet
 from ..core.progress import Progress, silent
 from ..core.units import MU0
+from .batch_columns import COLUMNS, check_magnet, column
 from .batch_lanes import HARD, solve_lanes
-from .fields import FLUX_LIMIT_T, PULLED_IN, STABLE, UNSTABLE
+from .fields import PULLED_IN, STABLE, UNSTABLE
 from .magnet_field import magnet_block
 from .planar import OK_UNSTABLE, TOUCHES, solve_planar_rows
 from .planar_march import WX, WY, E, H, M
@@ -46,16 +48,8 @@ RESULT = np.dtype(
 CHUNK = 4096
 _ORDER = 12
 _STEP = 0.4
-_LIMITS = {
-    "length_mm": (0.0, np.inf),
-    "E_MPa": (0.0, np.inf),
-    "side_mm": (0.0, np.inf),
-    "remanence_mT": (-FLUX_LIMIT_T * 1e3, FLUX_LIMIT_T * 1e3),
-    "flux_mT": (-FLUX_LIMIT_T * 1e3, FLUX_LIMIT_T * 1e3),
-    "angle_deg": (-36000.0, 36000.0),
-    "gap_mm": (0.0, np.inf),
-}
-_POSITIVE = ("length_mm", "E_MPa", "side_mm", "gap_mm")
+_WIDE = ("length_mm", "E_MPa")
+_MOST_THREADS = 1024
 
 
 def solve_many(
@@ -111,7 +105,9 @@ def solve_many(
     for name in RESULT.names or ():
         out[name] = np.nan if name not in ("outcome", "morse_index") else -1
     out["outcome"] = NOT_SOLVED
-    workers = threads or _cores()
+    workers = _cores()
+    if threads is not None:
+        workers = whole(threads, 1, _MOST_THREADS, "threads")
     starts = list(range(0, n, CHUNK))
 
     def work(start: int) -> int:
@@ -144,55 +140,56 @@ def _columns(
     designs: Mapping[str, ArrayLike] | NDArray[np.void], magnet: Magnet | None
 ) -> dict[str, Array]:
     """Return the columns, checked: those of sections (n, k), the others (n,)."""
-    given = designs.dtype.names if isinstance(designs, np.ndarray) else designs
-    names = set(given or ())
-    field = {"gap_mm"} if magnet is not None else {"flux_mT"}
-    wanted = {"length_mm", "E_MPa", "side_mm", "remanence_mT"} | field
-    known = wanted | (set() if magnet is not None else {"angle_deg"})
-    if not wanted <= names or not names <= known:
-        raise InputError(
-            f"designs must have the columns {', '.join(sorted(wanted))} in mm, MPa and "
-            f"mT (gap_mm with a magnet, flux_mT without); instead received "
-            f"{', '.join(sorted(names))}"
-        )
-    arrays = {name: np.asarray(designs[name], dtype=np.float64) for name in names}
-    arrays.setdefault("angle_deg", np.float64(90.0))  # type: ignore[arg-type]
     if magnet is not None:
-        del arrays["angle_deg"]
-    wide = ("length_mm", "E_MPa")
-    counts = [
-        a.shape[0] for k, a in arrays.items() if a.ndim == (2 if k in wide else 1)
-    ]
-    counts += [a.shape[0] for k, a in arrays.items() if k not in wide and a.ndim == 2]
-    n = max(counts, default=1)
-    sections = arrays["length_mm"].shape[-1] if arrays["length_mm"].ndim else 0
+        check_magnet(magnet)
+    arrays = _given(designs, before_magnet=magnet is not None)
+    n = max((len(a) for k, a in arrays.items() if a.ndim > (k in _WIDE)), default=1)
+    if arrays["length_mm"].ndim == 0 or arrays["length_mm"].shape[-1] == 0:
+        raise InputError(
+            "designs: length_mm in mm must have a column for each section of the rods; "
+            f"instead received shape {arrays['length_mm'].shape}"
+        )
+    sections = arrays["length_mm"].shape[-1]
     for name, array in arrays.items():
-        _check(name, array)
-        full = (n, sections) if name in (*wide, "side_mm", "remanence_mT") else (n,)
+        full = (n, sections) if name in (*_WIDE, "side_mm", "remanence_mT") else (n,)
+        fits = array
         if array.ndim == 1 and name in ("side_mm", "remanence_mT"):
-            array = array[:, None]
+            fits = array[:, None]
         try:
-            arrays[name] = np.ascontiguousarray(np.broadcast_to(array, full))
+            arrays[name] = np.ascontiguousarray(np.broadcast_to(fits, full))
         except ValueError:
             raise InputError(
-                f"designs: {name} must fit {n} designs of {sections} sections; instead "
-                f"received shape {array.shape}"
+                f"designs: {name} in {COLUMNS[name][2]} must fit {n} designs of "
+                f"{sections} sections; instead received shape {array.shape}"
             ) from None
     return arrays
 
 
-def _check(name: str, array: Array) -> None:
-    low, high = _LIMITS[name]
-    good = np.isfinite(array) & (array >= low) & (array <= high)
-    if name in _POSITIVE:
-        good &= array > 0.0
-    if not np.all(good):
-        bad = float(array[~good].flat[0])
-        unit = name.rsplit("_", 1)[1]
-        what = "above zero" if name in _POSITIVE else f"from {low:g} to {high:g}"
+def _given(
+    designs: Mapping[str, ArrayLike] | NDArray[np.void], *, before_magnet: bool
+) -> dict[str, Array]:
+    """Return the columns as they are given, their names and values checked."""
+    given = designs.dtype.names if isinstance(designs, np.ndarray) else designs
+    known_kind = isinstance(given, (Mapping, tuple)) or hasattr(given, "columns")
+    if given is None or not known_kind:
         raise InputError(
-            f"designs: every {name} must be {what} in {unit}; instead received {bad!r}"
+            "designs must be a mapping of columns or a structured array; instead "
+            f"received {shown(designs)}"
         )
+    names = [str(name) for name in given]
+    wanted = {"length_mm", "E_MPa", "side_mm", "remanence_mT"}
+    wanted |= {"gap_mm"} if before_magnet else {"flux_mT"}
+    known = wanted if before_magnet else wanted | {"angle_deg"}
+    if not wanted <= set(names) <= known:
+        raise InputError(
+            f"designs must have the columns {', '.join(sorted(wanted))} in mm, MPa and "
+            f"mT (gap_mm with a magnet, flux_mT without); instead received "
+            f"{', '.join(sorted(names))[:200]}"
+        )
+    arrays = {name: column(name, designs[name]) for name in names}
+    if not before_magnet:
+        arrays.setdefault("angle_deg", np.array(90.0))
+    return arrays
 
 
 def _solve_chunk(
@@ -206,7 +203,13 @@ def _solve_chunk(
         flux_T, angle = columns["flux_mT"] * 1e-3, np.radians(columns["angle_deg"])
         field = flux_T, np.cos(angle), np.sin(angle), none, none
     else:
-        field = none, none, none, _block(magnet), columns["gap_mm"]
+        field = (
+            none,
+            none,
+            none,
+            magnet_block(magnet, length_mm=0.0, gap_mm=0.0),
+            columns["gap_mm"],
+        )
     tips = np.empty((n, 4))
     outcome = np.empty(n, dtype=np.int8)
     index = np.zeros(n, dtype=np.int8)
@@ -278,20 +281,10 @@ def _uniform_fields(flux_T: Array, angle_deg: Array) -> Array:
     return fields
 
 
-def _block(magnet: Magnet) -> Array:
-    if magnet.elevation_deg != 0.0 or magnet.offset_mm[2] != 0.0:
-        raise InputError(
-            "magnet elevation_deg in deg and offset_mm[2] in mm must be 0 for batches, "
-            f"which are planar; instead received {magnet.elevation_deg!r} deg and "
-            f"{magnet.offset_mm[2]!r} mm"
-        )
-    return magnet_block(magnet, length_mm=0.0, gap_mm=0.0)
-
-
 def _magnet_fields(magnet: Magnet, gap_mm: Array, total_mm: Array) -> Array:
     fields = np.empty((len(gap_mm), 17))
     fields[:, 0] = 1.0
-    fields[:, 1:] = _block(magnet)
+    fields[:, 1:] = magnet_block(magnet, length_mm=0.0, gap_mm=0.0)
     fields[:, 4:7] -= gap_mm[:, None] * np.array(magnet.axes()[2])
     fields[:, 4] += total_mm
     fields[:, 1:7] /= total_mm[:, None]

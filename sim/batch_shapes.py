@@ -15,13 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.checks import finite, shown, store, whole
 from ..core.errors import InputError
 from ..core.magnet import Magnet
 from ..core.specimen import Specimen
 from ..core.units import MU0
-from .fields import FLUX_LIMIT_T
+from .batch_columns import COLUMNS, check_magnet, column
 from .magnet_field import magnet_block
 from .planar import GONE, OK_UNSTABLE, TOUCHES, solve_planar_rows
+from .scaling import MOST_POINTS
 
 Array = NDArray[np.float64]
 
@@ -55,8 +57,8 @@ class Designs:
     Raises
     ------
     InputError
-        If shapes disagree, a value is not finite, or a length, modulus, side or gap is
-        not above zero.
+        If shapes disagree, a value is not finite or out of range (`COLUMNS`), or the
+        magnet is off the plane.
     """
 
     length_mm: Array
@@ -69,30 +71,33 @@ class Designs:
     gap_mm: Array | None = None
 
     def __post_init__(self) -> None:
-        n = len(self.side_mm)
         if (self.flux_mT is None) == (self.magnet is None or self.gap_mm is None):
-            raise InputError("designs must have either flux_mT, or a magnet and gap_mm")
-        wide = ("length_mm", "E_MPa")
-        positive = (*wide, "side_mm", "gap_mm")
-        for name in (*positive, "remanence_mT", "flux_mT", "angle_deg"):
-            if (values := getattr(self, name)) is None:
-                continue
-            values = np.ascontiguousarray(values, dtype=np.float64)
-            if values.shape[:1] != (n,) or values.ndim != (2 if name in wide else 1):
+            raise InputError(
+                "designs must have either flux_mT in mT, or a magnet and gap_mm in mm; "
+                f"instead received {'both' if self.flux_mT is not None else 'neither'}"
+            )
+        if self.magnet is not None:
+            check_magnet(self.magnet)
+        columns = {
+            name: column(name, values)
+            for name in COLUMNS
+            if (values := getattr(self, name)) is not None
+            or name not in ("flux_mT", "gap_mm")
+        }
+        n, sections = columns["side_mm"].size, columns["length_mm"].shape[-1:]
+        if sections in ((), (0,)):
+            raise InputError(
+                "designs: length_mm in mm must have a column for each section; instead "
+                f"received shape {columns['length_mm'].shape}"
+            )
+        for name, values in columns.items():
+            shape = (n, *sections) if name in ("length_mm", "E_MPa") else (n,)
+            if values.shape != shape:
                 raise InputError(
-                    f"designs: {name} must have {n} rows; "
-                    f"instead received shape {values.shape}"
+                    f"designs: {name} in {COLUMNS[name][2]} must have {n} rows, shape "
+                    f"{shape}; instead received shape {values.shape}"
                 )
-            if not np.all(np.isfinite(values)) or (
-                name in positive and np.any(values <= 0.0)
-            ):
-                what = "above zero" if name in positive else "finite"
-                raise InputError(f"designs: every {name} must be {what}")
-            object.__setattr__(self, name, values)
-        for name in ("flux_mT", "remanence_mT"):
-            values = getattr(self, name)
-            if values is not None and np.any(np.abs(values) > FLUX_LIMIT_T * 1e3):
-                raise InputError(f"designs: every {name} must be within 30 000 mT")
+        store(self, **columns)
 
     def __len__(self) -> int:
         return len(self.side_mm)
@@ -108,6 +113,10 @@ def designs_of(
     InputError
         If its sections differ in side or remanence.
     """
+    if not isinstance(specimen, Specimen):
+        raise InputError(
+            f"specimen must be a Specimen; instead received {shown(specimen)}"
+        )
     if len(set(specimen.sides_mm)) > 1 or len(set(specimen.remanences_mT)) > 1:
         raise InputError(
             f"specimen {specimen.name!r} must have one side_mm and one remanence_mT "
@@ -119,8 +128,8 @@ def designs_of(
         E_MPa=np.array([[section.E_MPa for section in sections]]),
         side_mm=np.array([specimen.sides_mm[0]]),
         remanence_mT=np.array([specimen.remanences_mT[0]]),
-        flux_mT=np.array([flux_mT]),
-        angle_deg=np.array([angle_deg]),
+        flux_mT=np.array([finite(flux_mT, "flux_mT", "mT")]),
+        angle_deg=np.array([finite(angle_deg, "angle_deg", "deg")]),
     )
 
 
@@ -158,10 +167,18 @@ def solve_shapes(
         section, as many in each, so that every joint is one of them; `points` - 1 must
         be a multiple of the number of sections.
 
+    Raises
+    ------
+    InputError
+        If these are no designs, or the number of points cannot be.
+
     Notes
     -----
     Taylor order 10, corrected and bounded by order 14 (`planar`), on all cores.
     """
+    if not isinstance(designs, Designs):
+        raise InputError(f"designs must be Designs; instead received {shown(designs)}")
+    points = whole(points, 2, MOST_POINTS, "points")
     n, k = designs.length_mm.shape
     total_mm = designs.length_mm.sum(axis=1)
     side_m = designs.side_mm * 1e-3
@@ -188,7 +205,10 @@ def _section_stations(share: Array, points: int) -> Array:
     n, k = share.shape
     each = (points - 1) // k
     if each * k != points - 1 or each < 1:
-        raise InputError(f"points - 1 must be a multiple of {k}; received {points}")
+        raise InputError(
+            f"points - 1 must be a multiple of {k}, the number of sections; instead "
+            f"received {points}"
+        )
     ends = np.cumsum(share, axis=1)
     starts = ends - share
     inside = np.arange(1, each + 1) / each

@@ -21,6 +21,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import real_array
+from ..core.checks import listed, shown, whole
 from ..core.errors import InputError, SolverError
 from ..core.specimen import Specimen
 from ..core.units import rad_from_deg
@@ -32,9 +34,12 @@ from .check_energy import (
     lagrange,
     node_places,
 )
-from .fields import Field, Solution, Support, UniformField
+from .fields import Field, Solution, Support, UniformField, check_case
 
 Array = NDArray[np.float64]
+
+MOST_DEGREE = 40
+"""Of the polynomials: from 20 on, rounding is all that is left."""
 
 
 def verify(
@@ -59,16 +64,27 @@ def verify(
     Raises
     ------
     InputError
-        If the case is not planar or the solution has no shape.
+        If the case is not planar, or the solution has no shape or is of another rod.
     SolverError
         If the check solver finds no equilibrium near the solution.
     """
+    if not isinstance(solution, Solution):
+        raise InputError(
+            f"solution must be a Solution; instead received {shown(solution)}"
+        )
     if solution.centreline is None:
         raise InputError(
             f"a solution to verify must have a shape; instead received one with status "
             f"{solution.status!r}"
         )
     shape = solution.centreline
+    check_case(specimen, field, support or Support())
+    length_mm = specimen.length_mm
+    if abs(shape.s_mm[-1] - length_mm) > 1e-9 * length_mm:
+        raise InputError(
+            f"a solution to verify must be of a rod of {length_mm:g} mm, as the "
+            f"specimen is; instead received one of {shape.s_mm[-1]:g} mm"
+        )
     check = check_solve(
         specimen, field, support=support, degree=degree,
         start=(shape.s_mm, shape.theta_rad),
@@ -169,6 +185,9 @@ def check_solve(
         If Newton's method does not converge.
     """
     support = support or Support()
+    check_case(specimen, field, support)
+    degree = whole(degree, 1, MOST_DEGREE, "degree")
+    elements = whole(elements, 1, 1000, "elements")
     if not support.in_plane or not (isinstance(field, UniformField) or field.in_plane):
         raise InputError(
             "the check solver takes magnets and weight within the plane z = 0; instead "
@@ -183,7 +202,7 @@ def check_solve(
         for load in (0.25, 0.5, 0.75, 1.0):
             theta, H = _newton(grid, field, specimen.length_mm, theta, load)
     else:
-        theta = np.interp(nodes_s * 1e3, start[0], start[1])
+        theta = np.interp(nodes_s * 1e3, *_start(start))
         theta[0] = clamp
         theta, H = _newton(grid, field, specimen.length_mm, theta, 1.0)
     total, _, r, tip = energy(grid, field, specimen.length_mm, theta, 1.0)
@@ -195,6 +214,19 @@ def check_solve(
         morse_index=int(np.sum(np.linalg.eigvalsh(H[1:, 1:]) < 0.0)),
         energy_J=total, nodes=theta, mesh=mesh, degree=degree, clamp_rad=clamp,
     )  # fmt: skip
+
+
+def _start(start: tuple[Array, Array]) -> tuple[Array, Array]:
+    given = listed(start) or ()
+    if len(given) == 2:
+        s_mm = real_array(given[0], "start s_mm", "mm")
+        theta_rad = real_array(given[1], "start theta_rad", "rad")
+        if s_mm.ndim == 1 and s_mm.shape == theta_rad.shape and s_mm.size:
+            return s_mm, theta_rad
+    raise InputError(
+        "start must be two arrays of one length, s_mm in mm and theta_rad in rad; "
+        f"instead received {shown(start)}"
+    )
 
 
 def _mesh(specimen: Specimen, elements: int) -> Array:

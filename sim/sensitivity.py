@@ -23,12 +23,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..core.checks import finite
+from ..core.arrays import real_array
+from ..core.checks import finite, listed, shown
 from ..core.errors import InputError, SolverError
 from ..core.jit import njit
 from ..core.specimen import Specimen
 from ..core.units import MU0, rad_from_deg
-from .fields import Field, MagnetField, Solution, Support, UniformField
+from .fields import Field, MagnetField, Solution, Support, UniformField, check_case
 from .planar import ORDER, STEP, solve_planar
 from .planar_follow import solve3
 from .planar_march import (
@@ -321,6 +322,8 @@ def sensitivities(
     SolverError
         If there is no equilibrium, or it stands at a fold.
     """
+    check_case(specimen, field, support)
+    names = _names(parameters)
     if not (support.in_plane and (isinstance(field, UniformField) or field.in_plane)):
         raise InputError(
             "gravity_m_s2[2] in m/s2, magnet elevation_deg and offset_mm[2] must be 0 "
@@ -337,7 +340,6 @@ def sensitivities(
     array = field_array(field, specimen.length_mm)
     clamp = rad_from_deg(support.clamp_angle_deg)
     u = solve_planar(rod, array, clamp, 0.0, stations(2), ORDER, STEP)[-1]
-    names = tuple(parameters)
     records = [_record(name, specimen, field, support) for name in names]
     good, out = _derivatives(rod, array, u, records, s / specimen.length_mm)
     if not good or not np.all(np.isfinite(out)):
@@ -373,14 +375,23 @@ def _derivatives(
     return good, out[:, :, 3 : 3 + len(records)]
 
 
+def _names(parameters: Sequence[str]) -> tuple[str, ...]:
+    names = listed(parameters)
+    if names is None or not all(isinstance(name, str) for name in names):
+        raise InputError(
+            "parameters must be a sequence of names such as ['E_MPa[0]', 'side_mm']; "
+            f"instead received {shown(parameters)}"
+        )
+    return names
+
+
 def _stations(s_mm: ArrayLike | None, length_mm: float) -> Array:
     if s_mm is None:
         return stations(61) * length_mm
-    s = np.ascontiguousarray(s_mm, dtype=np.float64)
+    s = real_array(s_mm, "s_mm", "mm")
     if (
         s.ndim != 1
         or len(s) == 0
-        or not np.all(np.isfinite(s))
         or np.any(np.diff(s) < 0.0)
         or s[0] < 0.0
         or s[-1] > length_mm * (1.0 + 1e-12)

@@ -7,11 +7,11 @@ import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from ..core.checks import positive
+from ..core.checks import listed, positive, shown
 from ..core.errors import InputError
 from ..core.progress import Progress, silent
 from ..core.specimen import Specimen
-from .fields import MagnetField, Solution, Support, UniformField
+from .fields import MagnetField, Solution, Support, UniformField, check_case
 from .solve import NO_SUPPORT, solve
 
 Case = tuple[Specimen, UniformField | MagnetField]
@@ -94,7 +94,7 @@ def sweep(
     specimen: Specimen,
     field: UniformField | MagnetField,
     *,
-    values: Sequence[str] = (),
+    values: Sequence[str | float] = (),
     support: Support = NO_SUPPORT,
     model: str = "rod",
     points: int = 61,
@@ -109,8 +109,9 @@ def sweep(
         the sections ("20-5-5", mm) or the side (mm; the remanence stays).
     specimen, field
         The case around which it varies.
-    values : sequence of str, optional
-        Values as a person types them; those of the paper's figure by default.
+    values : sequence of str or float, optional
+        Values as a person types them, or numbers; those of the paper's figure by
+        default.
     support, model, points
         As for `solve`.
     progress : callable
@@ -125,11 +126,12 @@ def sweep(
     InputError
         If the study is unknown, or a value has no meaning for the case.
     """
-    if name not in STUDIES:
+    if not isinstance(name, str) or name not in STUDIES:
         raise InputError(
-            f"study must be one of {', '.join(STUDIES)}; instead received {name!r}"
+            f"study must be one of {', '.join(STUDIES)}; instead received {shown(name)}"
         )
-    chosen = tuple(values) or STUDIES[name].values
+    check_case(specimen, field, support)
+    chosen = _typed(values, STUDIES[name]) or STUDIES[name].values
     shapes = []
     for done, value in enumerate(chosen, start=1):
         rod, acting = _VARY[name](specimen, field, value)
@@ -162,13 +164,24 @@ def sweep_csv(name: str, shapes: Sequence[Shape]) -> str:
     return buffer.getvalue()
 
 
+def _typed(values: Sequence[str | float], study: Study) -> tuple[str, ...]:
+    """Return the values as text; a text by itself is no sequence of values."""
+    given = listed(values)
+    if given is None:
+        raise InputError(
+            f"values of the study {study.name!r} must be a sequence in {study.unit}, "
+            f"such as {list(study.values[:2])}; instead received {shown(values)}"
+        )
+    return tuple(str(value) for value in given)
+
+
 def _number(value: str, study: str) -> float:
     try:
         return float(value)
     except ValueError:
         raise InputError(
             f"values of the study {study!r} must be numbers in {STUDIES[study].unit}; "
-            f"instead received {value!r}"
+            f"instead received {shown(value)}"
         ) from None
 
 
@@ -206,7 +219,7 @@ def _length(specimen: Specimen, field: UniformField | MagnetField, value: str) -
     if len(lengths) != len(specimen.sections):
         raise InputError(
             f"values of the study 'length' must be {len(specimen.sections)} lengths in "
-            f"mm, such as 20-5-5; instead received {value!r}"
+            f"mm, such as 20-5-5; instead received {shown(value)}"
         )
     sections = tuple(
         replace(section, length_mm=length)

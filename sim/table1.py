@@ -6,10 +6,8 @@ import csv
 from functools import cache
 from pathlib import Path
 
-from ..core.errors import InputError
+from ..core.checks import whole
 from ..core.specimen import Section, Specimen
-
-NUMBERS = (1, 2, 3, 4, 5, 6, 7)
 
 
 def gmc(number: int, *, remeasured: bool = False) -> Specimen:
@@ -39,11 +37,8 @@ def gmc(number: int, *, remeasured: bool = False) -> Specimen:
     >>> gmc(2).length_mm
     30.0
     """
-    if number not in NUMBERS:
-        raise InputError(
-            f"GMC number must be from 1 to 7 (Table 1); instead received {number!r}"
-        )
-    return _table()[int(number) - 1][bool(remeasured)]
+    row = whole(number, 1, 7, "GMC number") - 1
+    return _table()[row][bool(remeasured)]
 
 
 @cache

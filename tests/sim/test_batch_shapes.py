@@ -92,8 +92,8 @@ def test_the_paper_bench_pushes_and_pulls():
     ("key", "value", "word"),
     [
         ("side_mm", [0.0], "above zero"),
-        ("E_MPa", [[20.0, 15.0, np.nan]], "above zero"),
-        ("flux_mT", [4e4], "30 000 mT"),
+        ("E_MPa", [[20.0, 15.0, np.nan]], "finite number in MPa"),
+        ("flux_mT", [4e4], "30000 mT"),
         ("flux_mT", None, "either"),
         ("length_mm", [[1.0] * 3] * 2, "rows"),
     ],
