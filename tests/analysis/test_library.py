@@ -414,5 +414,5 @@ def test_without_pyarrow_the_extra_is_named(tmp_path, monkeypatch):
     space = read_space(write_space(tmp_path))
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
-    with pytest.raises(MissingExtraError, match=r"magbend\[library\]"):
+    with pytest.raises(MissingExtraError, match=r"\.\[library\]"):
         build(space, tmp_path / "out")
