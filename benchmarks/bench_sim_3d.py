@@ -60,7 +60,7 @@ def kernel(rod, field, support: Support, steps: float | None = None):
         newton(table, flux, 1.0, n, CLAMP, R, r, 1.0, y, Z, J, none, work, bare)
 
     def index() -> None:
-        morse_index(table, flux, COARSE * n, R, r)
+        morse_index(table, flux, 1.0, COARSE * n, R, r)
 
     return run, index, r, n
 

@@ -15,13 +15,14 @@ when its load grows from zero:
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.jit import njit
+from .contact import in_reach, load_before_touching, touches_in_plane
 from .magnet_field import inside
-from .planar_contact import in_reach, touches
 from .planar_follow import SHRINK, SMALL, follow_load, residual, solve3, straight
 from .planar_march import MAX_ORDER, PART, STATE, WX, WY, E, H, M, march
 from .planar_one_sided import first_guess, narrow, one_sided
@@ -106,7 +107,7 @@ def _solve_row(  # type: ignore[no-untyped-def]
                 out[0, k] = s[k] * u[1]
                 out[1, k] = s[k] * u[2]
                 out[2, k] = clamp
-            if touches(field, margin, s, out):
+            if touches_in_plane(field, margin, s, out):
                 found[0] = TOUCHES
                 return
     simple = one_sided(rod, field)
@@ -184,7 +185,7 @@ def _solve_row(  # type: ignore[no-untyped-def]
     found[0] = OK_STABLE if index == 0 else OK_UNSTABLE
     if not _place(u, X, out):
         found[0] = FAILED
-    elif near and touches(field, margin, s, out):
+    elif near and touches_in_plane(field, margin, s, out):
         found[0] = GONE
     found[1] = index
     found[2] = error + _rounding(_reach(rod, math.hypot(X[9], X[10])), columns, D, d)
@@ -312,33 +313,16 @@ def _solve_by_following(
         found[0, 6] = load
 
 
-def _load_before_touching(
-    end: float,
-    rod: Array,
-    fields: Array,
-    clamp: float,
-    margins: Array,
-    s: Array,
-    order: int,
-    step: float,
-) -> float:
-    """Return up to which load a rod, whose branch ends at `end`, touches no magnet."""
-    low, high = 0.0, end
-    load = end * (1.0 - 1e-6)
-    for _ in range(20):
+def _load_before_touching(end: float, rod: Array, *rest: Any) -> float:
+    """Return up to which load a rod (arguments of `solve_planar_rows`) is clear."""
+
+    def clear(load: float) -> bool:
         part = rod.copy()
         part[:, M:] *= load
-        found, _, _ = solve_planar_rows(
-            part[None], fields, clamp, margins, s, order, step
-        )
-        if found[0, 0] > OK_UNSTABLE:
-            high = load
-        elif high == end:
-            return end
-        else:
-            low = load
-        load = 0.5 * (low + high)
-    return low
+        found, _, _ = solve_planar_rows(part[None], *rest)
+        return bool(found[0, 0] <= OK_UNSTABLE)
+
+    return load_before_touching(end, clear)
 
 
 def solve_planar(

@@ -1,8 +1,10 @@
 """Newton from a given tip, and load continuation of the planar rod.
 
 Dimensionless as `planar_march`. The equilibrium is followed from no load to full load
-with tangent predictors; where Newton would have to jump, the step is halved. The load
-at which no smaller step helps is a fold: beyond it the rod is pulled in.
+with tangent predictors; where Newton would have to jump, the step is halved. A branch
+changes its Morse index at single loads only, so a step over which that changes counts
+as a jump until it is too short for one. The load at which no smaller step helps is a
+fold: beyond it the rod is pulled in.
 """
 
 from __future__ import annotations
@@ -22,6 +24,8 @@ SMALL = 1e-7
 MAX_TRIALS = 400
 """Most Newton runs along a branch; a branch that needs more is given up."""
 MIN_LOAD_STEP = 1e-7
+SURE = 1e-3
+"""Step of the load too short for a jump to another branch."""
 
 
 @njit(**PART)
@@ -134,7 +138,7 @@ def follow_load(rod, field, clamp, u, order, step):  # type: ignore[no-untyped-d
             trial = newton(
                 rod, field, load + jump, clamp, u, order, step, first, X, D, T, C
             )
-        if trial >= 0 and abs(trial - index) <= 1:
+        if trial == index or (trial >= 0 and jump < SURE):
             if jump == 1.0 - load:
                 return trial, 1.0
             index = trial

@@ -21,6 +21,7 @@ from ..core.checks import shown, vector, whole
 from ..core.errors import InputError, SolverError
 from ..core.specimen import Specimen
 from ..core.units import mT_from_T, rad_from_deg
+from .contact import load_before_touching, touches
 from .fields import (
     FLUX_LIMIT_T,
     PULLED_IN,
@@ -34,9 +35,9 @@ from .fields import (
 )
 from .magnet_field import BLOCK_SIZE
 from .scaling import MOST_POINTS, field_array, stations
-from .spatial_march import AXIAL, C1, C3, K1, K3, MU1, WX, WZ, H, flux_at
+from .spatial_march import AXIAL, C1, C3, K1, K3, MU1, MU2, WX, WY, WZ, H, flux_at
 from .spatial_rod import SpatialRod, SpatialSection, Vector, rod_table
-from .spatial_solve import shape, solve_pose, touches
+from .spatial_solve import shape, solve_pose
 
 __all__ = ["SpatialRod", "SpatialSection", "SpatialSolution", "solve_spatial"]
 
@@ -179,21 +180,44 @@ def solve_spatial(
     cos, sin = math.cos(angle), math.sin(angle)
     clamp = np.array([[-sin, 0.0, cos], [cos, 0.0, sin], [0.0, 1.0, 0.0]])
     s = stations(points)
-    if flux[0] != 0.0 and touches(flux, np.outer(s, clamp[:, 2]), margin):
+    direction = clamp[:, 2]
+    if flux[0] != 0.0 and touches(flux, margin, s, _straight(s, direction)):
         raise InputError(
             "gap_mm must leave the undeformed rod clear of the magnet, with half its "
             f"side to spare; instead received {getattr(field, 'gap_mm', math.nan):g} mm"
         )
     n = _steps(table, flux, clamp[:, 2])
-    R, r = clamp.copy(), clamp[:, 2].copy()
-    index, load, error = solve_pose(table, flux, n, clamp, R, r)
+    rest = flux, n, clamp, margin, s
+    index, load, error, states = _equilibrium(table, *rest)
     if index < 0:
-        return _gone(flux, L, load, clamp[:, 2])
-    states = np.empty((points, 18))
-    shape(table, flux, 2 * n, R, r, s, states)
-    if touches(flux, states[:, 12:15], margin):
-        return _gone(flux, L, load, states[-1, 12:15])
+        scaled = [AXIAL, MU1, MU2, WX, WY, WZ]
+
+        def clear(part: float) -> bool:
+            less = table.copy()
+            less[:, scaled] *= part
+            return _equilibrium(less, *rest)[0] >= 0
+
+        return _gone(flux, L, load_before_touching(load, clear), direction)
     return _solution(rod, table, flux, s, states, index, error)
+
+
+def _straight(s: Array, direction: Array) -> Array:
+    """Return positions and tangents of the straight rod, shape (n, 6)."""
+    return np.hstack([np.outer(s, direction), np.tile(direction, (len(s), 1))])
+
+
+def _equilibrium(
+    table: Array, flux: Array, n: float, clamp: Array, margin: float, s: Array
+) -> tuple[int, float, float, Array]:
+    """Return Morse index (-1: none clear of the magnet), load, error and states."""
+    R, r = np.empty((3, 3)), np.empty(3)
+    index, load, error = solve_pose(table, flux, n, clamp, R, r)
+    states = np.empty((len(s), 18))
+    if index >= 0:
+        shape(table, flux, 2 * n, R, r, s, states)
+        if touches(flux, margin, s, states[:, [12, 13, 14, 2, 5, 8]]):
+            index = -1
+    return index, load, error, states
 
 
 @lru_cache(maxsize=256)

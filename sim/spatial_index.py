@@ -137,18 +137,18 @@ def negatives(S):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def morse_index(rod, field, n, R, r):  # type: ignore[no-untyped-def]
+def morse_index(rod, field, load, n, R, r):  # type: ignore[no-untyped-def]
     """Count the focal points between tip and root: the unstable directions."""
     m = unknowns(field)
     y, Z = np.zeros(STATE), np.zeros((COLUMN, 2 * m))
     K, KZ, ys, Zs, b, b2, p = workspace(2 * m)
-    begin(rod, field, 1.0, R, r, y, Z, b)
+    begin(rod, field, load, R, r, y, Z, b)
     X0, X1, B, S = (
         np.zeros((m, m)), np.zeros((m, m)), np.zeros((m, m)), np.zeros((m, m)),
     )  # fmt: skip
     index = 0
     for i in range(rod.shape[0]):
-        loaded(rod, i, 1.0, p)
+        loaded(rod, i, load, p)
         count = steps_of(rod, i, n / SPLIT)
         h = rod[i, 0] / count
         for _ in range(count):
@@ -174,5 +174,5 @@ def morse_index(rod, field, n, R, r):  # type: ignore[no-untyped-def]
                     S[a, c] = S[c, a] = 0.5 * (S[a, c] + S[c, a])
             index += negatives(S)
         if i + 1 < rod.shape[0]:
-            cross(rod, field, 1.0, i, y, Z[:, :m], b)
+            cross(rod, field, load, i, y, Z[:, :m], b)
     return index

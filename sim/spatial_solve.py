@@ -32,22 +32,34 @@ COARSE = 0.5
 CHORD = 1e-2
 """Correction after which the matrix is kept."""
 MIN_LOAD_STEP = 1e-6
+SURE = 1e-3
+"""Step of the load too short for a jump to another branch."""
+LONGEST = 0.5
+"""Largest predicted move of the tip."""
+
+
+@njit(cache=True)
+def _turn(Ra, Rb, x):  # type: ignore[no-untyped-def]
+    """Write the turn from Ra to Rb into `x[:3]` (its sine, in Ra); return the trace."""
+    M = np.zeros((3, 3))
+    for a in range(3):
+        for c in range(3):
+            for i in range(3):
+                M[a, c] += Ra[i, a] * Rb[i, c]
+    x[0, 0] = 0.5 * (M[2, 1] - M[1, 2])
+    x[1, 0] = 0.5 * (M[0, 2] - M[2, 0])
+    x[2, 0] = 0.5 * (M[1, 0] - M[0, 1])
+    return M[0, 0] + M[1, 1] + M[2, 2]
 
 
 @njit(cache=True)
 def _miss(y, Rc, x):  # type: ignore[no-untyped-def]
     """Write minus the root's turn and shift into `x`; return the trace."""
-    M = np.zeros((3, 3))
-    for a in range(3):
-        for c in range(3):
-            for i in range(3):
-                M[a, c] += Rc[i, a] * y[3 * i + c]
-    x[0, 0] = -0.5 * (M[2, 1] - M[1, 2])
-    x[1, 0] = -0.5 * (M[0, 2] - M[2, 0])
-    x[2, 0] = -0.5 * (M[1, 0] - M[0, 1])
+    trace = _turn(Rc, y[:9].reshape(3, 3), x)
     for i in range(3):
+        x[i, 0] = -x[i, 0]
         x[3 + i, 0] = -y[12 + i]
-    return M[0, 0] + M[1, 1] + M[2, 2]
+    return trace
 
 
 @njit(cache=True)
@@ -68,6 +80,30 @@ def _move(R, r, x):  # type: ignore[no-untyped-def]
         R[i, 2] = e2 - s * t2 + c * (x0 * t1 - x1 * t0)
         r[i] += x[3 + i, 0]
     return size
+
+
+@njit(cache=True)
+def _unloaded(rod, field, n, Rc, R, r, y, none, bare):  # type: ignore[no-untyped-def]
+    """Set the tip's pose (R, r) to that of the unloaded rod, whatever its rest shape.
+
+    Without load a march from any pose gives the rod but for a rigid motion.
+    """
+    R[:] = Rc
+    r[:] = 0.0
+    march(rod, field, 0.0, n, R, r, y, none, bare)
+    for i in range(3):
+        for j in range(3):
+            R[i, j] = 0.0
+            for a in range(3):
+                for b in range(3):
+                    R[i, j] += Rc[i, a] * y[3 * b + a] * Rc[b, j]
+        for a in range(3):
+            for b in range(3):
+                r[i] -= Rc[i, a] * y[3 * b + a] * y[12 + b]
+    for a in range(3):  # what the march's steps have bent of the axes
+        for b in range(a):
+            R[:, a] -= (R[:, a] * R[:, b]).sum() * R[:, b]
+        R[:, a] /= math.sqrt((R[:, a] * R[:, a]).sum())
 
 
 @njit(cache=True)
@@ -106,28 +142,49 @@ def newton(rod, field, load, n, Rc, R, r, first, y, Z, J, none, work, bare):  # 
 
 @njit(cache=True)
 def follow(rod, field, n, Rc, R, r, y, Z, J, none, work, bare):  # type: ignore[no-untyped-def]
-    """Follow the equilibrium from no load to full load; return the load reached."""
+    """Follow the equilibrium from no load, at (R, r), to full load.
+
+    Returns the Morse index and the load reached.
+
+    Predictions go along the secant: a tangent would leave the plane where a planar
+    rod begins to swing, and Newton's matrix is singular.
+
+    A branch changes its index at single loads only: a step over which it changes is
+    taken again in halves, until it is too short to have jumped to another branch.
+    """
     Rb, rb = R.copy(), r.copy()
-    load, jump = 0.0, 0.125
-    if not newton(rod, field, 0.0, n, Rc, R, r, 4.0, y, Z, J, none, work, bare):
-        return 0.0
+    secant, x = np.zeros((6, 1)), np.zeros((6, 1))
+    load, jump, index = 0.0, 0.125, 0
     while load < 1.0:
         jump = min(jump, 1.0 - load)
+        ahead = 1.0 if jump == 1.0 - load else load + jump
         Rb[:], rb[:] = R, r
-        if newton(rod, field, load + jump, n, Rc, R, r, 0.4, y, Z, J, none, work, bare):
-            load = 1.0 if jump == 1.0 - load else load + jump
+        x[:] = jump * secant
+        there = -1
+        if _move(R, r, x) < LONGEST and newton(
+            rod, field, ahead, n, Rc, R, r, 0.1, y, Z, J, none, work, bare
+        ):
+            there = morse_index(rod, field, ahead, COARSE * n, R, r)
+        if there == index or (there >= 0 and jump < SURE):
+            _turn(Rb, R, secant)
+            secant[3:, 0] = r - rb
+            secant /= jump
+            index, load = there, ahead
             jump *= 2.0
-            continue
-        R[:], r[:] = Rb, rb
-        jump *= 0.5
-        if jump < MIN_LOAD_STEP:
-            return load
-    return 1.0
+        else:
+            R[:], r[:] = Rb, rb
+            jump *= 0.5
+            if jump < MIN_LOAD_STEP:
+                return index, load
+    return index, 1.0
 
 
 @njit(cache=True)
 def solve_pose(rod, field, n, Rc, R, r):  # type: ignore[no-untyped-def]
-    """Find the tip's pose (R, r) at full load, from the one given or from no load.
+    """Find the tip's pose (R, r) at full load.
+
+    Newton from the unloaded rod is believed where it must lead to the branch from zero
+    load (see `planar`): no direction is unstable there under the full load.
 
     Returns
     -------
@@ -138,32 +195,23 @@ def solve_pose(rod, field, n, Rc, R, r):  # type: ignore[no-untyped-def]
     y, Z, none = np.zeros(STATE), np.zeros((COLUMN, columns)), np.zeros((COLUMN, 0))
     work, bare = workspace(columns), workspace(0)
     J, x = np.zeros((6, 6)), np.zeros((6, 1))
+    _unloaded(rod, field, n, Rc, R, r, y, none, bare)
     R0, r0 = R.copy(), r.copy()
-    index = -1
-    if newton(rod, field, 1.0, n, Rc, R, r, 1.0, y, Z, J, none, work, bare):
-        index = morse_index(rod, field, COARSE * n, R, r)
+    index = morse_index(rod, field, 1.0, COARSE * n, R, r)
+    if index == 0:
+        index = -1
+        if newton(rod, field, 1.0, n, Rc, R, r, 1.0, y, Z, J, none, work, bare):
+            index = morse_index(rod, field, 1.0, COARSE * n, R, r)
     if index != 0:
         R[:], r[:] = R0, r0
-        load = follow(rod, field, n, Rc, R, r, y, Z, J, none, work, bare)
+        index, load = follow(rod, field, n, Rc, R, r, y, Z, J, none, work, bare)
         if load < 1.0:
             return -1, load, 0.0
-        index = morse_index(rod, field, COARSE * n, R, r)
     march(rod, field, 1.0, 2.0 * n, R, r, y, none, bare)
     _miss(y, Rc, x)
     error = np.sum(np.abs(x))
     solve6(J, x)
     return index, 1.0, error + _move(R, r, x) + 1e-15 * n
-
-
-@njit(cache=True)
-def touches(field, points, margin):  # type: ignore[no-untyped-def]
-    """Tell whether any of the points (n, 3) is within `margin` of the magnet."""
-    if field[0] == 0.0:
-        return False
-    for k in range(points.shape[0]):
-        if inside(field[1:], points[k, 0], points[k, 1], points[k, 2], margin):
-            return True
-    return False
 
 
 @njit(cache=True)

@@ -20,6 +20,7 @@ from magbend.core.specimen import Section, Specimen
 from magbend.core.units import MU0
 from magbend.sim import (
     PULLED_IN,
+    STABLE,
     MagnetField,
     Solution,
     Support,
@@ -206,24 +207,35 @@ def test_a_straight_rod_unstable_under_full_load_does_not_jump() -> None:
     assert np.hypot(*np.diff(tips, axis=0).T).max() < 0.2
 
 
-def test_directions_in_and_out_of_the_plane_are_those_in_space() -> None:
-    """The spatial solver counts all directions, by its own march of 6 columns."""
-    counts = []
-    for rod, field in near_magnets(150):
-        row, array = rod_array(rod, Support()), field_array(field, rod.length_mm)
-        found = solve_planar(
-            row, array, 0.0, 0.5 / rod.length_mm, stations(61), 16, 0.3
-        )
-        if found[0] >= GONE:
+def test_a_branch_without_symmetry_is_stable_up_to_its_fold() -> None:
+    # Nothing but a symmetry makes equilibria cross: an unstable one is another branch.
+    for rod, field in near_magnets(600):
+        solution = attempt(rod, field, Support())
+        assert solution is None or solution.morse_index <= 0
+
+
+def test_the_rod_in_space_finds_the_planar_branch_near_magnets_too() -> None:
+    """By a march and a continuation of its own; it counts all directions."""
+    swinging = []
+    for rod, field in near_magnets(600):
+        if (flat := attempt(rod, field, Support())) is None:
             continue
         space = solve_spatial(rod, field)
-        tip = found[7][:2, -1] * rod.length_mm
-        if len(space.s_mm) and np.abs(space.r_mm[-1] - [*tip, 0.0]).max() < 1e-4:
-            swings = swing_index(row, array, found[8], 0.3)
-            assert found[1] + swings == space.morse_index
-            counts.append(swings)
-    assert len(counts) > 50
-    assert max(counts) == 1
+        assert space.load_limit == pytest.approx(flat.load_limit, abs=3e-5)
+        if flat.centreline is None:
+            assert len(space.s_mm) == 0
+            continue
+        miss_mm = np.abs(space.r_mm[:, :2] - flat.centreline.points_mm).max()
+        assert miss_mm < 1e-5
+        assert np.abs(space.r_mm[:, 2]).max() < 1e-5
+        row, array = rod_array(rod, Support()), field_array(field, rod.length_mm)
+        tip = solve_planar(row, array, 0.0, 0.0, stations(2), 16, 0.3)[8]
+        swings = swing_index(row, array, tip, 0.3)
+        assert space.morse_index == flat.morse_index + swings
+        assert flat.stable_in_space is (space.morse_index == 0)
+        swinging.append(swings)
+    assert len(swinging) > 300
+    assert max(swinging) == 1
 
 
 def test_a_straight_rod_is_as_stable_in_every_direction() -> None:
@@ -301,11 +313,12 @@ def test_whether_a_rod_touches_does_not_depend_on_its_points(
         offset_mm=(x_mm - 30.0 + back_mm, y_mm + back_mm, 0.0),
     )
     field = MagnetField(magnet=magnet, gap_mm=10.0)
-    if clearance_mm < 0.5:
-        with pytest.raises(InputError, match="gap_mm"):
-            solve(plain_rod(10.0), field, points=points)
-    else:
-        assert solve(plain_rod(10.0), field, points=points).centreline is not None
+    for solver in (solve, solve_spatial):
+        if clearance_mm < 0.5:
+            with pytest.raises(InputError, match="gap_mm"):
+                solver(plain_rod(10.0), field, points=points)
+        else:
+            assert solver(plain_rod(10.0), field, points=points).status == STABLE
 
 
 def test_a_rod_that_bends_onto_the_magnet_says_at_which_load() -> None:
@@ -313,6 +326,8 @@ def test_a_rod_that_bends_onto_the_magnet_says_at_which_load() -> None:
     field = MagnetField(magnet=magnet, gap_mm=0.8)
     solution = solve(plain_rod(3.0), field)
     assert solution.status == PULLED_IN
+    space = solve_spatial(plain_rod(3.0), field)
+    assert space.load_limit == pytest.approx(solution.load_limit, abs=1e-5)
     # Just before, the magnet is half a side away, and that is before any fold.
     before = Support(load_factor=solution.load_limit * (1.0 - 1e-5))
     line = solve(plain_rod(3.0), field, support=before).centreline

@@ -254,6 +254,39 @@ def test_pulled_in_is_a_result() -> None:
     assert space.seen_from_above().centreline is None
 
 
+@pytest.mark.parametrize("turn", [0.9, 3.0, 40.0])
+def test_an_unloaded_rod_has_its_rest_shape(turn) -> None:
+    rod = SpatialRod(
+        sections=(
+            section(length_mm=30.0, rest_curvature_per_mm=(0.0, turn / 30.0, 0.0)),
+        )
+    )
+    space = solve_spatial(rod, (0.0, 0.0, 0.0))
+    angle = turn * space.s_mm / 30.0
+    arc = np.column_stack([np.sin(angle), 1.0 - np.cos(angle)]) * 30.0 / turn
+    assert space.r_mm[:, :2] == pytest.approx(arc, abs=1e-7)
+    assert space.morse_index == 0
+
+
+@pytest.mark.parametrize("points", [2, 5, 61])
+@pytest.mark.parametrize("clearance_mm", [0.45, 0.55])
+def test_a_magnet_above_is_touched_between_points_too(points, clearance_mm) -> None:
+    """An edge of a cube of 2 mm points at an arch, half a side of which is 0.5 mm."""
+    rod = SpatialRod(
+        sections=(section(length_mm=30.0, rest_curvature_per_mm=(-0.03, 0.0, 0.0)),)
+    )
+    top = solve_spatial(rod, (0.0, 0.0, 0.0)).r_mm
+    assert top[-1, 2] > 5.0
+    # On the arch's outer normal where it turns by 45 deg, below the bend.
+    turn = np.pi / 4.0
+    x_mm = np.sin(turn) / 0.03 + clearance_mm * np.sin(turn)
+    z_mm = (1.0 - np.cos(turn)) / 0.03 - clearance_mm * np.cos(turn)
+    cube = Magnet.cube(2.0, 1e-6, offset_mm=(x_mm - 18.0, 0.0, z_mm - 1.0))
+    field = MagnetField(magnet=replace(cube, axis_angle_deg=0.0), gap_mm=10.0)
+    space = solve_spatial(rod, field, points=points)
+    assert (len(space.s_mm) > 0) == (clearance_mm > 0.5)
+
+
 def test_bad_input_is_refused() -> None:
     with pytest.raises(InputError, match="density_kg_m3"):
         solve_spatial(gmc(2), (0.0, 1.0, 0.0), support=ABOVE)
@@ -302,8 +335,8 @@ def test_index_in_a_uniform_field_is_that_of_six_unknowns(seed, load, thin) -> N
     pose *= np.linalg.det(pose)
     pose = np.ascontiguousarray(pose)
     tip = np.array([1.0, 0.0, 0.0])
-    index = morse_index(table, uniform, 60.0, pose, tip)
-    assert index == morse_index(table, block, 60.0, pose, tip)
+    index = morse_index(table, uniform, 1.0, 60.0, pose, tip)
+    assert index == morse_index(table, block, 1.0, 60.0, pose, tip)
     near = field_array(MagnetField(magnet=cube, gap_mm=60.0), 30.0)
-    index = morse_index(table, near, 60.0, pose, tip)
-    assert index == morse_index(table, near, 240.0, pose, tip)
+    index = morse_index(table, near, 1.0, 60.0, pose, tip)
+    assert index == morse_index(table, near, 1.0, 240.0, pose, tip)
