@@ -39,6 +39,7 @@ class JudgedScan:
         return {
             "remanence_T": self.fit.remanence_T,
             "remanence_sd_T": self.fit.remanence_sd_T,
+            "birge_ratio": self.fit.birge_ratio,
             "chi2_reduced": self.fit.chi2_reduced,
             "figure": str(self.figure),
             "readings": [
@@ -58,9 +59,13 @@ class JudgedScan:
     def lines(self) -> list[str]:
         """Return the same for people."""
         fit = self.fit
+        widened = ""
+        if fit.birge_ratio > 1.0:
+            widened = f" (sd widened by their Birge ratio {fit.birge_ratio:.2g})"
         lines = [
             f"remanence {fit.remanence_T:.4f} T +- {fit.remanence_sd_T:.4f} T from "
-            f"{len(fit.readings)} readings; put it into [magnet] of the rig file",
+            f"{len(fit.readings)} readings{widened}; put it into [magnet] of the rig "
+            "file",
             "gap mm   flux mT  fitted mT  residual",
         ]
         for reading in fit.readings:

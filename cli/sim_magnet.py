@@ -98,8 +98,15 @@ def _print(fit: MagnetFit, printed: list[dict[str, float]]) -> None:
         spread = f" +- {fit.remanence_sd_T:.4f}"
     chi2 = " (no reading left over to say how well they agree)"
     if fit.chi2_reduced == fit.chi2_reduced:
-        chi2 = f" (reduced chi2 {fit.chi2_reduced:.3g})"
+        low_T, high_T = fit.remanence_95_T
+        chi2 = f", 95 % from {low_T:.4f} to {high_T:.4f} T "
+        chi2 += f"(reduced chi2 {fit.chi2_reduced:.3g})"
     typer.echo(f"one remanence for all: {fit.remanence_T:.4f}{spread} T{chi2}")
+    if fit.birge_ratio > 1.0:
+        typer.echo(
+            f"the readings scatter {fit.birge_ratio:.2g} times as much as their sd_mT "
+            "says: the uncertainty is widened by that (Birge ratio)"
+        )
     if fit.offset_sd_mm:
         typer.echo(f"probe offset: {fit.offset_mm:.2f} +- {fit.offset_sd_mm:.2f} mm")
     if abs(fit.remanence_T) > STRONGEST_T:

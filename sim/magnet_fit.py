@@ -65,6 +65,9 @@ class MagnetFit:
     ----------
     remanence_T, remanence_sd_T : float
         The remanence and its standard deviation; NaN with one reading and no sd.
+    remanence_95_T : tuple of float
+        Its 95 % interval: the wider of what the scatter (Student's t) and the standard
+        deviations given (normal) say.
     offset_mm, offset_sd_mm : float
         How much farther than stated the probe's sensitive point is from the N face; 0
         unless it was fitted.
@@ -73,14 +76,20 @@ class MagnetFit:
     chi2_reduced : float
         Of the residuals over their standard deviations (over `tolerance_percent` of the
         readings where none was given); NaN where no reading is left over.
+    birge_ratio : float
+        By how much the scatter of the readings exceeds the standard deviations given,
+        the root of `chi2_reduced`: both of the fit's are widened by it. 1 where it does
+        not, or none were given.
     """
 
     remanence_T: float
     remanence_sd_T: float
+    remanence_95_T: tuple[float, float]
     offset_mm: float
     offset_sd_mm: float
     readings: tuple[ReadingVerdict, ...]
     chi2_reduced: float
+    birge_ratio: float
 
 
 def axis_share(
@@ -142,7 +151,8 @@ def fit_magnet(
         Sides of the magnet, the last along the polarisation, in mm.
     sd_mT : sequence of float, optional
         Standard deviation of each reading, in mT. Without it all readings are taken to
-        be equally exact in percent, and their own scatter gives the uncertainty.
+        be equally exact in percent, and their own scatter gives the uncertainty. Where
+        the readings scatter more than it allows, the uncertainty is widened.
     free_offset : bool
         Fit the offset of the probe's sensitive point along the axis too.
     tolerance_percent : float
@@ -157,6 +167,12 @@ def fit_magnet(
     ------
     InputError
         If a number cannot be, or there are fewer readings than unknowns.
+
+    Notes
+    -----
+    The widening is that of R. T. Birge, Physical Review 40, 207 (1932): all standard
+    deviations given are taken to be too small by one factor. It cannot see an error
+    that the readings share, such as a wrong gap; `free_offset` looks for that.
     """
     gaps, flux, sd = _checked(gaps_mm, flux_mT, sd_mT, 2 if free_offset else 1)
     vector(sides_mm, "magnet sides_mm", "mm")
@@ -184,10 +200,11 @@ def fit_magnet(
     columns = np.column_stack([share, slope] if free_offset else [share])
     covariance = np.linalg.inv(columns.T @ (columns * weight[:, None]))
     deviations = np.sqrt(np.diag(covariance))
-    if sd is None:
-        deviations = (
-            deviations * math.sqrt(chi2_reduced) if spare else deviations * math.nan
-        )
+    scatter = math.sqrt(chi2_reduced)
+    widened = sd is None or scatter > 1.0
+    half = float(deviations[0]) * _reach_95(scatter, spare, stated=sd is not None)
+    if widened:
+        deviations = deviations * scatter
     alone = flux / share
     allowed = tolerance * np.abs(flux)
     if sd is not None:
@@ -207,11 +224,24 @@ def fit_magnet(
     return MagnetFit(
         remanence_T=remanence,
         remanence_sd_T=float(deviations[0]),
+        remanence_95_T=(remanence - half, remanence + half),
         offset_mm=offset,
         offset_sd_mm=float(deviations[1]) if free_offset else 0.0,
         readings=readings,
         chi2_reduced=chi2_reduced,
+        birge_ratio=scatter if sd is not None and widened else 1.0,
     )
+
+
+def _reach_95(scatter: float, spare: int, *, stated: bool) -> float:
+    """Return how many standard deviations reach 95 %.
+
+    By Student's t for the scatter seen; if they are stated, at least by the normal law.
+    """
+    from scipy.special import ndtri, stdtrit
+
+    by_scatter = float(stdtrit(spare, 0.975)) * scatter if spare else math.nan
+    return max(float(ndtri(0.975)), by_scatter) if stated else by_scatter
 
 
 def _checked(

@@ -79,6 +79,39 @@ def test_the_uncertainty_is_the_scatter() -> None:
     assert abs(np.mean(pulls)) < 0.2
 
 
+@pytest.mark.parametrize("count", [3, 8])
+@pytest.mark.parametrize("understated", [1.0, 5.0])
+@pytest.mark.parametrize("free_offset", [False, True])
+def test_the_interval_covers_though_the_stated_sd_are_too_small(
+    count: int, understated: float, free_offset: bool
+) -> None:
+    rng = np.random.default_rng(9)
+    gaps = np.linspace(30.0, 90.0, count)
+    truth = 1.3e3 * axis_share(gaps)
+    covered, times = 0, 400
+    for _ in range(times):
+        sd = np.full(count, 0.03 / understated)
+        flux = truth + rng.normal(0.0, 0.03, count)
+        fit = fit_magnet(gaps, flux, sd_mT=sd, free_offset=free_offset)
+        low, high = fit.remanence_95_T
+        covered += low < 1.3 < high
+        assert fit.birge_ratio == max(1.0, np.sqrt(fit.chi2_reduced))
+    # Of 95 % of 400 three standard deviations are 3.3 %.
+    assert covered / times > 0.917
+    if understated > 1.0:
+        assert covered / times < 0.983
+
+
+def test_stated_sd_that_are_too_large_narrow_nothing() -> None:
+    gaps = np.linspace(30.0, 90.0, 8)
+    flux = 1.3e3 * axis_share(gaps)
+    fit = fit_magnet(gaps, flux, sd_mT=0.01 * flux)
+    assert fit.birge_ratio == 1.0
+    assert fit.remanence_sd_T == pytest.approx(0.013 / np.sqrt(8.0))
+    low, high = fit.remanence_95_T
+    assert high - low == pytest.approx(2 * 1.95996 * fit.remanence_sd_T, rel=1e-5)
+
+
 def test_one_wrong_reading_does_not_blame_the_others() -> None:
     gaps = [40.0, 50.0, 60.0, 70.0, 80.0]
     flux = [float(1.3e3 * axis_share(gap)) for gap in gaps]
