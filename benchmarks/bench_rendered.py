@@ -57,6 +57,12 @@ def aligned(points: np.ndarray, line: np.ndarray) -> np.ndarray:
     return moved
 
 
+def start_deg(points: np.ndarray) -> float:
+    """Return the direction at the first of evenly spread points, of a parabola."""
+    x, y = -1.5 * points[0] + 2.0 * points[1] - 0.5 * points[2]
+    return float(np.degrees(np.arctan2(y, x)))
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", nargs="?", type=Path, default=FIXTURES)
@@ -75,9 +81,10 @@ def main() -> int:
     )
     print(
         f"{'photograph':12} {'RMS mm':>8} {'max mm':>8} {'aligned':>8} {'tip mm':>8} "
-        f"{'length':>8} {'width mm':>9} {'RMS px':>8} {'ms':>5}  flags"
+        f"{'length':>8} {'width mm':>9} {'RMS px':>8} {'ms':>5} "
+        f"{'turn deg':>9} {'sd':>6}  flags"
     )
-    rows, failed = [], 0
+    rows, turns, failed = [], [], 0
     truths = folder / "truth" if (folder / "truth").is_dir() else folder
     for path in sorted(folder.iterdir()):
         truth_file = truths / f"{path.stem}.json"
@@ -99,6 +106,9 @@ def main() -> int:
         points = np.column_stack([found.points["x_mm"], found.points["y_mm"]])
         distance = signed_distance(points, truth["line"])
         best = signed_distance(aligned(points, truth["line"]), truth["line"])
+        turn = start_deg(found.points_px) - start_deg(truth["px"][::4])
+        turn = (turn + 180.0) % 360.0 - 180.0
+        turn_sd = found.clamp_angle_sd_deg
         pixels = signed_distance(found.points_px, truth["px"])
         row = (
             float(np.sqrt(np.mean(distance**2))),
@@ -110,10 +120,11 @@ def main() -> int:
             float(np.sqrt(np.mean(pixels**2))),
         )
         rows.append(row)
+        turns.append((turn, turn_sd))
         print(
             f"{path.name:12} {row[0]:8.4f} {row[1]:8.4f} {row[2]:8.4f} {row[3]:8.4f} "
-            f"{row[4]:+8.4f} {row[5]:+9.4f} {row[6]:8.3f} {took_ms:5.0f}  "
-            f"{', '.join(found.flags)}"
+            f"{row[4]:+8.4f} {row[5]:+9.4f} {row[6]:8.3f} {took_ms:5.0f} "
+            f"{turn:+9.3f} {turn_sd:6.3f}  {', '.join(found.flags)}"
         )
     if rows:
         table = np.abs(np.array(rows))
@@ -124,6 +135,11 @@ def main() -> int:
                 f"{name:12} {values[0]:8.4f} {values[1]:8.4f} {values[2]:8.4f} "
                 f"{values[3]:8.4f} {values[4]:8.4f} {values[5]:9.4f} {values[6]:8.3f}"
             )
+        error, sd = np.array(turns).T
+        print(
+            f"direction at the clamp: RMS {np.sqrt(np.mean(error**2)):.3f} deg, "
+            f"{np.sqrt(np.mean((error / sd) ** 2)):.2f} stated deviations"
+        )
     print(f"{len(rows)} measured, {failed} failed")
     return 0 if rows and not failed else 1
 

@@ -111,7 +111,7 @@ def main() -> int:
         f"{'RMS mm':>8} {'tip mm':>8} {'length':>8} {'width':>8} {'RMS px':>7} "
         f"{'ms':>5} case, flags"
     )
-    rows, failed, wrong = [], 0, 0
+    rows, turns, failed, wrong = [], [], 0, 0
     for index in range(options.count):
         rng = np.random.default_rng([options.seed, index])
         drawn = None
@@ -150,6 +150,8 @@ def main() -> int:
             abs(found.width_mm - scene.side_mm),
             float(np.sqrt(np.mean(pixels**2))),
         )
+        turn = (found.pose.angle_deg - scene.clamp.pose.angle_deg + 180.0) % 360.0
+        turns.append((turn - 180.0, found.clamp_angle_sd_deg))
         rows.append(row)
         wrong += row[4] > 1.0
         print(
@@ -164,6 +166,11 @@ def main() -> int:
             ("worst", table.max(axis=0)),
         ):
             print(" ".join(f"{value:8.4f}" for value in values), name)
+        error, sd = np.array(turns).T
+        print(
+            f"direction at the clamp: RMS {np.sqrt(np.mean(error**2)):.3f} deg, "
+            f"{np.sqrt(np.mean((error / sd) ** 2)):.2f} stated deviations"
+        )
     print(f"{len(rows)} measured, {failed} refused, {wrong} wrong by more than a pixel")
     return 1 if wrong else 0
 

@@ -64,6 +64,8 @@ class CurveFit:
         The splines whose coefficients give theta and kappa.
     root : ndarray, shape (p, p)
         Upper triangular matrix R with R R^T the covariance of the parameters.
+    lever : ndarray, shape (n,)
+        By how much a measured point turns the root, rad per px along its normal.
     """
 
     curve: Curve
@@ -75,6 +77,7 @@ class CurveFit:
     basis: Basis
     coefficients: Array
     root: Array
+    lever: Array
 
     @property
     def sigma(self) -> Array:
@@ -91,6 +94,34 @@ class CurveFit:
     def sigma_kappa(self) -> Array:
         """Standard deviation of kappa, shape (n,)."""
         return np.asarray(_deviation(self.basis.first + 1, self.basis.slope, self.root))
+
+    def turned(self, drift: Array, reach: float) -> float:
+        """Return by how much errors that neighbours share turn the root.
+
+        Parameters
+        ----------
+        drift : ndarray, shape (n,)
+            Standard deviation of such an error of each measured point, px.
+        reach : float
+            Distance over which their correlation falls by a factor e, px.
+
+        Returns
+        -------
+        float
+            Standard deviation of theta at the root, rad.
+        """
+        kept = math.exp(-float(self.curve.s[1] - self.curve.s[0]) / reach)
+        return math.sqrt(_shared_power(self.lever * drift, kept))
+
+
+@njit(cache=True)
+def _shared_power(part: Array, kept: float) -> float:
+    """Variance of the sum of parts whose correlation falls by `kept` a step."""
+    total, before = 0.0, 0.0
+    for x in part:
+        total += x * x + 2.0 * x * before
+        before = kept * (before + x)
+    return max(total, 0.0)
 
 
 @njit(cache=True)
@@ -278,7 +309,15 @@ def _with_covariance(
         basis=basis,
         coefficients=coefficients,
         root=root * noise * np.sqrt(correlation / shared),
+        lever=_lever(jacobian, basis, root) * weight / shared,
     )
+
+
+def _lever(jacobian: Array, basis: Basis, root: Array) -> Array:
+    """Return the change of theta at the root by points of unit weight."""
+    first = basis.first[0] + 1
+    turn = basis.value[0] @ root[first : first + 4]
+    return np.asarray(jacobian @ (root @ turn))
 
 
 @njit(cache=True)

@@ -89,6 +89,7 @@ def _mean(fits: Sequence[CurveFit], weights: Array) -> CurveFit:
         curve=curve,
         residual=mean([item.residual for item in fits]),
         coefficients=coefficients,
+        lever=mean([item.lever for item in fits]),
         root=np.ascontiguousarray(upper.T[::-1, ::-1]),
     )
 

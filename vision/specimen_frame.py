@@ -10,6 +10,7 @@ ends |g.t| a / 2 past the axis' tip, and the clamp's front plane appears shifted
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -34,14 +35,14 @@ SHADE_LEFT = 0.17
 SIDE_FACE = 0.07
 THETA_PX = 0.003
 """Systematic part of a tangent angle, times the width: pixel sampling, as above."""
-CLAMP_PX = 0.03
-CLAMP_SHADE = 0.4
-CLAMP_REACH = 4.0
-CLAMP_PLACE_PX = 0.3
-"""The same for the direction at the clamp, where paper, JPEG and shade move the edges:
-of the shade's pull over so many widths beside the clamp, this share is left, and turns
-the rod within a width. A clamp whose place is so far off has the direction of another
-point of a bent rod."""
+DRIFT_SHADE = 0.5
+DRIFT_WALL = 0.02
+DRIFT_REACH = 1.5
+"""Errors that neighbours share: the midline drifts by this share of the shade's pull,
+and of the side wall that is seen, alike over so many widths. They turn the direction at
+the clamp, from which the whole frame hangs."""
+CLAMP_PLACE_PX = 0.2
+"""A clamp whose place is so far off has the direction of another point of the rod."""
 UNKNOWN_CLAMP_MM = 5.0
 HIDDEN_MM = 0.05
 """A clamp of unknown height may rise so far above the rod's axis; and what part of the
@@ -207,8 +208,8 @@ def _in_frame(
     scale = np.interp(even, s_mm, stretch)
     local = _local(camera, pixel, angle, height)
     across = local.across + np.abs(local.rise_across)
-    side = SIDE_FACE * np.abs(local.rise_across) * table["width_px"] / across
-    table["sigma_px"] = np.hypot(table["sigma_px"], side)
+    wall = np.abs(local.rise_across) * table["width_px"] / across
+    table["sigma_px"] = np.hypot(table["sigma_px"], SIDE_FACE * wall)
     table |= {
         "s_mm": even,
         "x_mm": np.interp(even, s_mm, own[:, 0]),
@@ -227,7 +228,11 @@ def _in_frame(
         tip_mm=(float(own[-1, 0]), float(own[-1, 1])),
         tip_angle_deg=float(np.degrees(heading[-1] - heading[0])),
         width_mm=float(np.median(table["width_mm"][table["good"] > 0.5])),
-        clamp_angle_sd_deg=_clamp_sd_deg(refined, table),
+        clamp_angle_sd_deg=_clamp_sd_deg(
+            refined,
+            np.interp(grid.s, s_px, wall),
+            _hidden_px(refined, setting, float(local.rise_along[0])),
+        ),
         length_px=float(s[-1] - s[0]),
         width_px=float(np.median(refined.width[refined.good])),
         clamp_px=(float(points[0, 0]), float(points[0, 1])),
@@ -236,16 +241,20 @@ def _in_frame(
     )
 
 
-def _clamp_sd_deg(refined: Refined, table: dict[str, Array]) -> float:
-    """Return the standard deviation of the direction at the clamp."""
-    curve, width = refined.fit.curve, table["width_px"][0]
-    near = refined.shaded[refined.good & (curve.s < CLAMP_REACH * width)]
-    shade = float(np.sqrt(np.mean(near**2))) if near.size else 0.0
+def _clamp_sd_deg(refined: Refined, wall: Array, hidden: float) -> float:
+    """Return the standard deviation of the direction at the clamp.
+
+    `wall` is how wide the side wall is seen, and `hidden` how much of the root may not
+    be seen, px; where in it the rod begins is even odds.
+    """
+    fit, width = refined.fit, float(refined.width[0])
+    drift = np.hypot(DRIFT_SHADE * refined.shaded, DRIFT_WALL * wall)
+    place = math.hypot(CLAMP_PLACE_PX, hidden / math.sqrt(3.0))
     parts = (
-        table["sigma_theta_rad"][0], CLAMP_PX / width, CLAMP_SHADE * shade / width,
-        CLAMP_PLACE_PX * curve.kappa[0],
+        fit.sigma_theta[0], fit.turned(drift, DRIFT_REACH * width),
+        place * fit.curve.kappa[0],
     )  # fmt: skip
-    return float(np.degrees(np.linalg.norm(parts)))
+    return math.degrees(math.hypot(*parts))
 
 
 def _root(refined: Refined, ends: _Local, setting: Setting, side_mm: float) -> float:
@@ -291,14 +300,18 @@ def root_hidden(refined: Refined, setting: Setting) -> bool:
     Not where the height of the clamp or the length of the rod is known: then the root
     is put where it belongs.
     """
-    camera = setting.calibration
-    if camera is None or refined.clamp is None:
+    if setting.calibration is None:
         return False
-    if setting.clamp_height_mm is not None or setting.length_mm is not None:
-        return False
-    curve = refined.fit.curve
-    at = _local(camera, curve.points[:1], curve.theta[:1], setting.rod_height_mm)
-    return bool(at.rise_along[0] * UNKNOWN_CLAMP_MM > HIDDEN_MM * at.along[0])
+    ends = refined.fit.curve.points[:1], refined.fit.curve.theta[:1]
+    at = _local(setting.calibration, *ends, setting.rod_height_mm)
+    hidden = _hidden_px(refined, setting, float(at.rise_along[0]))
+    return hidden > HIDDEN_MM * float(at.along[0])
+
+
+def _hidden_px(refined: Refined, setting: Setting, rise: float) -> float:
+    """Return how much of the root a clamp of unknown height may hide."""
+    known = setting.clamp_height_mm is not None or setting.length_mm is not None
+    return 0.0 if known or refined.clamp is None else max(0.0, rise) * UNKNOWN_CLAMP_MM
 
 
 def _local(camera: Calibration, points: Array, theta: Array, height: float) -> _Local:

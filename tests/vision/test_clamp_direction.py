@@ -1,0 +1,60 @@
+"""The direction at the clamp is as sure as the measurement says."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from magbend.vision import Measurement, Pose, as_photo, extract
+from magbend.vision.scene import Block, Scene, SceneLight, render_scene, scene_camera
+from magbend.vision.synthetic import curve
+
+HEIGHT_MM, TOP_MM = 0.9, 4.0
+
+
+def measured(
+    kind: str, bend: float, away_deg: float, seed: int, top_mm: float | None = None
+) -> tuple[Measurement, float]:
+    """Measure a rod that points up, seen at 6 degrees; and the error in degrees."""
+    pose = Pose(x_mm=0.0, y_mm=-14.0, angle_deg=92.0, height_mm=HEIGHT_MM)
+    camera = scene_camera(
+        size_px=(1100, 900), focal_px=4200.0, height_mm=212.0, tilt_deg=6.0,
+        tilt_direction_deg=away_deg, target_mm=(0.0, 0.0),
+    )  # fmt: skip
+    scene = Scene(
+        clamp=Block(pose=pose, height_mm=TOP_MM),
+        centreline=curve(kind, angle_deg=bend, length_mm=28.0),
+        light=SceneLight(shadow_direction_deg=70.0 * seed, shadow_depth=0.3),
+    )
+    image = render_scene(scene, camera, np.random.default_rng(seed))
+    found = extract(
+        as_photo(image), camera, rod_height_mm=HEIGHT_MM, clamp_height_mm=top_mm
+    )
+    assert found.ok, found.reason
+    assert found.pose is not None
+    return found, found.pose.angle_deg - pose.angle_deg
+
+
+def test_direction_is_as_sure_as_it_says():
+    cases = [("arc", 70.0), ("graded", -90.0), ("s", 40.0), ("arc", -110.0)]
+    score = []
+    for seed, (kind, bend) in enumerate(cases):
+        for away in (0.0, 180.0):
+            found, error = measured(kind, bend, away + 30.0 * seed, seed)
+            score.append(error / found.clamp_angle_sd_deg)
+    assert 0.4 < np.sqrt(np.mean(np.square(score))) < 1.5
+    assert np.abs(score).max() < 3.0
+
+
+def test_a_hidden_root_leaves_the_direction_of_a_bent_rod_in_doubt():
+    away = next(
+        away for away in (90.0, 270.0)
+        if "root_hidden" in measured("arc", 90.0, away, 1)[0].flags
+    )  # fmt: skip
+    hidden, error = measured("arc", 90.0, away, 1)
+    known, known_error = measured("arc", 90.0, away, 1, TOP_MM)
+    straight, _ = measured("straight", 0.0, away, 1)
+    assert hidden.clamp_angle_sd_deg > 4.0 * known.clamp_angle_sd_deg
+    assert abs(error) < 2.0 * hidden.clamp_angle_sd_deg
+    assert abs(known_error) < 3.0 * known.clamp_angle_sd_deg
+    # A straight rod points the same way wherever it begins.
+    assert straight.clamp_angle_sd_deg < 0.3 * hidden.clamp_angle_sd_deg
