@@ -17,6 +17,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 from ..core.checks import finite, positive, size, vector, within
 from ..core.errors import ConfigError, InputError
 from ..core.units import T_from_mT, mT_from_T
+from .student_t import student_t_95
 
 Array = NDArray[np.float64]
 Sides = tuple[float, float, float]
@@ -238,10 +240,8 @@ def _reach_95(scatter: float, spare: int, *, stated: bool) -> float:
 
     By Student's t for the scatter seen; if they are stated, at least by the normal law.
     """
-    from scipy.special import ndtri, stdtrit
-
-    by_scatter = float(stdtrit(spare, 0.975)) * scatter if spare else math.nan
-    return max(float(ndtri(0.975)), by_scatter) if stated else by_scatter
+    by_scatter = student_t_95(spare) * scatter if spare else math.nan
+    return max(NormalDist().inv_cdf(0.975), by_scatter) if stated else by_scatter
 
 
 def _checked(

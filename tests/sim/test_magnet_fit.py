@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.special import stdtrit
 
 from magbend.core.errors import ConfigError, InputError
 from magbend.core.magnet import Magnet
@@ -16,6 +17,7 @@ from magbend.sim.magnet_fit import (
     paper_readings,
     read_readings,
 )
+from magbend.sim.student_t import student_t_95
 
 
 def test_the_papers_readings() -> None:
@@ -100,6 +102,11 @@ def test_the_interval_covers_though_the_stated_sd_are_too_small(
     assert covered / times > 0.917
     if understated > 1.0:
         assert covered / times < 0.983
+
+
+@pytest.mark.parametrize("freedom", [1, 2, 3, 4, 7, 30, 1001])
+def test_students_t_is_scipys(freedom: int) -> None:
+    assert student_t_95(freedom) == pytest.approx(stdtrit(freedom, 0.975), rel=1e-11)
 
 
 def test_stated_sd_that_are_too_large_narrow_nothing() -> None:
