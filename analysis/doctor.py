@@ -12,6 +12,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from ..core.errors import how_to_install
+
 REQUIRED = (
     "numpy",
     "scipy",
@@ -90,7 +92,7 @@ def _installed(names: tuple[str, ...]) -> tuple[list[str], list[str]]:
 def _required() -> Finding:
     present, missing = _installed(REQUIRED)
     if missing:
-        detail = f"missing: {', '.join(missing)}; install with: pip install magbend"
+        detail = f"missing: {', '.join(missing)}; to repair magbend, {how_to_install()}"
         return Finding(subject="packages", status="broken", detail=detail)
     return Finding(subject="packages", status="ok", detail=", ".join(present))
 
@@ -100,7 +102,7 @@ def _extras() -> list[Finding]:
     for extra, names in EXTRAS.items():
         present, missing = _installed(names)
         if missing:
-            detail = f"not installed; wanted? pip install 'magbend[{extra}]'"
+            detail = f"not installed; if wanted, {how_to_install(extra)}"
             status = "absent"
         else:
             detail, status = ", ".join(present), "ok"

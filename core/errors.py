@@ -47,6 +47,15 @@ class StoreError(MagbendError):
     """A run folder, library or model file that is missing, torn or altered."""
 
 
+def how_to_install(extra: str = "") -> str:
+    """Return the command that installs magbend, or an extra of it, from its checkout.
+
+    It is on no package index.
+    """
+    what = f'".[{extra}]"' if extra else "."
+    return f"install it in the checkout with: pip install {what}"
+
+
 class MissingExtraError(MagbendError):
     """An optional package is needed and not installed.
 
@@ -63,5 +72,5 @@ class MissingExtraError(MagbendError):
     def __init__(self, package: str, extra: str, purpose: str) -> None:
         super().__init__(
             f"{purpose} needs the package {package}, which is not installed; "
-            f'install it in the checkout with: pip install ".[{extra}]"'
+            f"{how_to_install(extra)}"
         )
