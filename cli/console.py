@@ -49,16 +49,22 @@ def _plain(value: Any) -> Any:
 
 
 @contextlib.contextmanager
-def progress(what: str) -> Iterator[Progress]:
+def progress(what: str, *, kept: str = "") -> Iterator[Progress]:
     """Yield a callback that shows a bar with time left, or plain lines where no tty is.
 
-    The bar goes to standard error, so that standard output stays for results.
+    The bar goes to standard error, so that standard output stays for results. `kept` is
+    what `main` says after Ctrl-C is left of the work.
     """
-    if sys.stderr.isatty():
-        with _bar(what) as callback:
-            yield callback
-    else:
-        yield _PlainLines(what)
+    try:
+        if sys.stderr.isatty():
+            with _bar(what) as callback:
+                yield callback
+        else:
+            yield _PlainLines(what)
+    except KeyboardInterrupt as stop:
+        if kept:
+            stop.add_note(kept)
+        raise
 
 
 @contextlib.contextmanager

@@ -41,7 +41,8 @@ def build(
     from ..analysis.library.space import read_space
 
     what = read_space(space)
-    with progress("designs") as tell:
+    kept = f"{out} keeps the finished partitions; the same command goes on from there"
+    with progress("designs", kept=kept) as tell:
         summary = builder.build(what, out, scheduler=scheduler, progress=tell)
     if as_json:
         print_json(asdict(summary))

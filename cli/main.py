@@ -55,10 +55,24 @@ def options(
     os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, as of shells: 128 and the number of SIGINT."""
+
+
 def main() -> None:
-    """Run the command line; a user's mistake ends in one sentence and exit code 1."""
+    """Run the command line; a user's mistake ends in one sentence and exit code 1.
+
+    Ctrl-C ends in one sentence too, and exit code 130.
+    """
     try:
         app()
+    except KeyboardInterrupt as stop:
+        _say_interrupted(stop)
+        sys.exit(INTERRUPTED)
+    except SystemExit as end:
+        if end.code == INTERRUPTED:  # typer's, for a Ctrl-C within a command
+            _say_interrupted(end)
+        raise
     except MagbendError as error:
         _stop(error, str(error))
     except BrokenPipeError:
@@ -71,6 +85,14 @@ def main() -> None:
         if isinstance(error, FileExistsError):
             reason = "is a file, not a folder; give another name"
         _stop(error, f"{name}{reason}")
+
+
+def _say_interrupted(end: BaseException | None) -> None:
+    """Say so, and what the interrupted command noted is kept (`console.progress`)."""
+    while end is not None and not isinstance(end, KeyboardInterrupt):
+        end = end.__cause__ or end.__context__
+    notes = getattr(end, "__notes__", [])
+    typer.echo("; ".join(["magbend: stopped by Ctrl-C", *notes]), err=True)
 
 
 def _stop(error: Exception, sentence: str) -> None:

@@ -224,7 +224,8 @@ def extract(
         if path is not None:
             output_file(path)
     output_folder(folder)
-    with progress("photographs") as report:
+    kept = f"{folder} holds what was measured; --resume goes on from there"
+    with progress("photographs", kept=kept) as report:
         result = extract_files(
             images,
             folder,
