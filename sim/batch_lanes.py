@@ -21,26 +21,15 @@ import math
 import numpy as np
 
 from ..core.jit import njit
-from .magnet_field import inside, plane_flux
+from .batch_survey import OPTIONS, near, sorted_rows, survey, tip_load
 from .planar_march import E, H, M
 from .taylor8 import COLUMN, LANES, SERIES, STATE, column_step, state_step
 
 HARD = 9
 """Outcome of a rod that the lanes leave to the scalar solver."""
-STEP_UNIFORM = 0.6
-"""What one step takes: errors stay below 1e-5 mm for rods of 30 mm."""
-STEP_MAGNET = 0.48
-"""The same, for errors below 1e-6 mm."""
-MOST_STEPS = 4
-"""Most steps in a section."""
-LONGEST_ROD = 3.0
-"""Largest sum of them: up to 3 pi / 2 there is one solution with gamma rising to T."""
-ANTIPARALLEL = -0.996
-"""Least cosine between the clamp's direction and the load's."""
 CLOSE = 2e-4
 """Correction after which the last march leaves about 1e-9."""
 ROUNDING = 1e-12
-OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 # Offsets, in one array of work space, of what the lanes hold. With constant distances
 # the compiler knows that nothing overlaps, and runs the loops over lanes on vectors.
@@ -59,128 +48,6 @@ _C2 = _C1 + LANES * COLUMN
 _T = _C2 + LANES * COLUMN
 _PACK = _T + LANES * SERIES
 """State, columns by tip angle and by load, series; then h, e, m of every section."""
-
-
-@njit(**OPTIONS)
-def _load(x, y, length, gap, margin, sign, magnet, w, i):  # type: ignore[no-untyped-def]
-    """Set flux, direction of the load and gradients of rod `i` with its tip at (x, y).
-
-    Return False, and no flux, where there is no field or the magnet is in the way.
-    """
-    w[_FLUX + i] = 0.0
-    px = length * (x - 1.0) + gap * magnet[12]
-    py = length * y + gap * magnet[13]
-    if inside(magnet, px, py, 0.0, length * margin):
-        return False
-    b = plane_flux(magnet, px, py)
-    size = math.sqrt(b[0] * b[0] + b[1] * b[1])
-    if size < 1e-12:
-        return False
-    c = b[0] / size
-    s = b[1] / size
-    g = length / size
-    w[_FLUX + i] = size
-    w[_CF + i] = sign * c
-    w[_SF + i] = sign * s
-    w[_BX + i] = length * (c * b[2] + s * b[3])
-    w[_BY + i] = length * (c * b[3] + s * b[4])
-    w[_TX + i] = g * (c * b[3] - s * b[2])
-    w[_TY + i] = g * (c * b[4] - s * b[3])
-    return True
-
-
-@njit(**OPTIONS)
-def _ready(rod, size, cosine, pull, step):  # type: ignore[no-untyped-def]
-    """Return the rod's compliance to its load, and how many steps a section needs.
-
-    0 steps: not for the lanes, as the rod is too long, or as the straight rod may be
-    unstable under compression and `pull`, the change of the load across the rod as its
-    tip moves across (neither is, by itself, where its product with a compliance is
-    below 1; nor both, where the sum is: Dunkerley). What one step takes is that of
-    `planar_march.substeps`, with the most that the moment can come to: between tip and
-    clamp, e q^2 / 2 = P (cos gamma_L - cos gamma) < P (1 - cos T).
-    """
-    across = 0.0
-    bend = math.sqrt(1.5 - 0.5 * cosine)
-    sigma = 0.0
-    total = 0.0
-    soft = 0.0
-    longest = 0.0
-    for k in range(rod.shape[0]):
-        hk = rod[k, H]
-        ep = rod[k, E] * abs(rod[k, M]) * size
-        z = hk * math.sqrt(ep)
-        longest = max(longest, z)
-        total += z
-        soft += ep * hk * (sigma + 0.5 * hk)
-        across += rod[k, E] * hk * (sigma * (sigma + hk) + hk * hk / 3.0)
-        sigma += hk
-    longest *= bend / step
-    if not total < LONGEST_ROD or longest > MOST_STEPS:
-        return soft, 0
-    if pull > 0.0 and pull * across + soft * max(0.0, -cosine) >= 1.0:
-        return soft, 0
-    return soft, max(1, math.ceil(longest))
-
-
-@njit(**OPTIONS)
-def _alike(rod, exactly):  # type: ignore[no-untyped-def]
-    """Tell whether all sections are magnetised the same way, or exactly the same."""
-    for k in range(1, rod.shape[0]):
-        if rod[k, M] * rod[0, M] < 0.0 or (exactly and rod[k, M] != rod[0, M]):
-            return False
-    return True
-
-
-@njit(**OPTIONS)
-def _survey(rods, length, margin, flux, cosine, sine, magnet, gap, w, start, steps):  # type: ignore[no-untyped-def]
-    """Find the load on each straight rod, and how many steps it needs (0: hard).
-
-    `start` receives the compliance to the load, the flux and the load's direction.
-    """
-    uniform = magnet.shape[0] == 0
-    step = STEP_UNIFORM if uniform else STEP_MAGNET
-    pull = 0.0
-    for i in range(rods.shape[0]):
-        sign = -1.0 if rods[i, 0, M] < 0.0 else 1.0
-        known = _alike(rods[i], not uniform)
-        if uniform:
-            turn = -sign if flux[i] < 0.0 else sign
-            start[i, 1] = abs(flux[i])
-            start[i, 2] = turn * cosine[i]
-            start[i, 3] = turn * sine[i]
-        elif known and not _near(1.0, 0.0, length[i], gap[i], margin[i], magnet):
-            known = _load(1.0, 0.0, length[i], gap[i], 0.0, sign, magnet, w, 0)
-            start[i, 1] = w[_FLUX]
-            start[i, 2] = w[_CF]
-            start[i, 3] = w[_SF]
-            # d(m B sin phi) / dy
-            pull = w[_BY] * w[_SF] + w[_FLUX] * w[_CF] * w[_TY]
-            pull *= abs(rods[i, 0, M])
-        else:
-            known = False
-        steps[i] = 0
-        if known and start[i, 2] > ANTIPARALLEL:
-            start[i, 0], steps[i] = _ready(
-                rods[i], start[i, 1], start[i, 2], pull, step
-            )
-
-
-@njit(**OPTIONS)
-def _sorted(steps):  # type: ignore[no-untyped-def]
-    """Return the rows that have steps, those with equally many side by side."""
-    ends = np.zeros(MOST_STEPS + 1, dtype=np.int64)
-    for n in steps:
-        ends[n] += 1
-    ends[0] = 0
-    for n in range(1, MOST_STEPS + 1):
-        ends[n] += ends[n - 1]
-    rows = np.empty(ends[MOST_STEPS], dtype=np.int64)
-    for i in range(steps.shape[0] - 1, -1, -1):
-        if steps[i] > 0:
-            ends[steps[i]] -= 1
-            rows[ends[steps[i]]] = i
-    return rows
 
 
 @njit(**OPTIONS)
@@ -307,35 +174,26 @@ def _correct(count, w):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _near(x, y, length, gap, margin, magnet):  # type: ignore[no-untyped-def]
-    """Tell whether a rod with its tip at (x, y) might touch its magnet.
-
-    A curve of length 1 between two points at a distance d stays within
-    sqrt(1 - d^2) / 2 of the straight line between them (an ellipse); eight pieces of
-    that line are checked.
-    """
-    d2 = x * x + y * y
-    far = 0.5 * math.sqrt(max(0.0, 1.0 - d2)) + math.sqrt(d2) / 16.0
-    far = length * (far + margin)
-    ox = gap * magnet[12] - length
-    oy = gap * magnet[13]
-    found = False
-    for k in range(9):
-        r = length * k / 8.0
-        found = found or inside(magnet, r * x + ox, r * y + oy, 0.0, far)
-    return found
-
-
-@njit(**OPTIONS)
 def _load_all(rows, rods, length, margin, magnet, gap, w, outcome):  # type: ignore[no-untyped-def]
     """Set the loads at all tips; where there is none, the rod is `HARD`."""
     for i in range(rows.shape[0]):
         row = rows[i]
         sign = -1.0 if rods[row, 0, M] < 0.0 else 1.0
-        if outcome[row] == 0 and not _load(
-            w[_X + i], w[_Y + i], length[row], gap[row], margin[row], sign, magnet, w, i
-        ):
+        if outcome[row] != 0:
+            continue
+        size, cf, sf, bx, by, tx, ty = tip_load(
+            w[_X + i], w[_Y + i], length[row], gap[row], margin[row], sign, magnet
+        )
+        w[_FLUX + i] = size
+        if size == 0.0:
             outcome[row] = HARD
+            continue
+        w[_CF + i] = cf
+        w[_SF + i] = sf
+        w[_BX + i] = bx
+        w[_BY + i] = by
+        w[_TX + i] = tx
+        w[_TY + i] = ty
 
 
 @njit(**OPTIONS)
@@ -394,7 +252,7 @@ def _solve_block(  # type: ignore[no-untyped-def]
         if not (good and change < 1e-3 and before <= CLOSE):
             outcome[row] = HARD
             continue
-        if not uniform and _near(x, y, length[row], gap[row], margin[row], magnet):
+        if not uniform and near(x, y, length[row], gap[row], margin[row], magnet):
             outcome[row] = HARD
 
 
@@ -425,9 +283,9 @@ def solve_lanes(  # type: ignore[no-untyped-def]
     start = np.empty((n, 4))
     steps = np.empty(n, dtype=np.int64)
     w = np.zeros(_PACK + 3 * sections * LANES)
-    _survey(rods, length, margin, flux, cosine, sine, magnet, gap, w, start, steps)
+    survey(rods, length, margin, flux, cosine, sine, magnet, gap, start, steps)
     outcome[:] = HARD
-    order = _sorted(steps)
+    order = sorted_rows(steps)
     for first in range(0, order.shape[0], LANES):
         rows = order[first : first + LANES]
         most = steps[rows[-1]]
