@@ -98,7 +98,7 @@ class Kernel:
         """Run compiled or, within `once`, as written."""
         left = _calls_left.get()
         if left is None:
-            return self.compiled(*args)
+            return (self._compiled or self.compiled)(*args)
         left[0] -= 1
         if left[0] < 0:
             raise _Unfit

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.jit import njit
-from .robust import median
+from .robust import median, row_quantiles
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -153,24 +153,15 @@ def find_edges(
     filters = np.concatenate(
         [_level_filter(strip.shape[1], before, gap, window, blur) for gap in gaps]
     )
-    out = np.full((2, 5, len(points)), np.nan)
-    growth, certainty = np.zeros(len(points)), np.zeros(len(points))
-    levels = np.empty((6, len(points)))
+    out = np.empty((2, 7, len(points)))
     for side, (outwards, edge) in enumerate(((-1.0, low), (1.0, high))):
         _sample(grey, points, normals, edge, outwards, before, np.float32(sign), strip)
-        _levels(strip, filters, levels)
-        _smooth(levels, smooth)
-        _cross(strip, before, levels[:3], reach, blur, out[side])
+        _measure_side(strip, before, filters, smooth, reach, blur, out[side])
         out[side, 0] += outwards * edge
-        out[side, 2:] = levels[3:]
-        middle = 0.5 * (levels[0::3] + levels[1::3]) + levels[2::3] * blur / _ROOT_2PI
-        sure = 1.0 / (levels[5] ** 2 + (_SHADE * (levels[4] - levels[3])) ** 2)
-        growth += sure * (middle[1] - middle[0]) / out[side, 1]
-        certainty += sure
     # Levels close to the edges know the shade and so the middle; those clear of the
     # blur, whose shape is not quite a Gaussian's, know the width, on a side without
     # shade.
-    growth /= certainty
+    growth = (out[0, 5] + out[1, 5]) / (out[0, 6] + out[1, 6])
     out[:, 0] += np.where(np.abs(growth) < 0.5, growth, 0.0)
     return Edges(
         low=-out[0, 0], high=out[1, 0], slope_low=out[0, 1], slope_high=out[1, 1],
@@ -212,7 +203,7 @@ def rough_edges(
     _sample(grey, points, normals, axis, 1.0, count, np.float32(sign), strip)
     # Of the whole profile: where the curve runs along the edge of a deep shadow, the
     # profile's middle is half shadow.
-    dark = median(np.quantile(strip[::8], 0.2, axis=1))
+    dark = median(row_quantiles(strip[::8], 0.2))
     paper = median(np.fmax.reduce(strip, axis=1))
     level = dark + EDGE_LEVEL * (paper - dark)
     # Again under the shade that lies beside the dark, which may be far from white.
@@ -352,36 +343,59 @@ def _levels(strip: Image, filters: Array, levels: Array) -> None:
         levels[3, i], levels[4, i], levels[5, i] = d, e, f
 
 
-@njit(cache=True)
-def _cross(
-    strip: Image, before: int, levels: Array, reach: float, blur: float, out: Array
-) -> None:
-    """Find the crossing nearest to the expected place; fit a line through 4 samples."""
-    count, columns = strip.shape
+@njit(cache=True, error_model="numpy")
+def _measure_side(
+    strip: Image, before: int, filters: Array, smooth: int, reach: float, blur: float,
+    out: Array,
+) -> None:  # fmt: skip
+    """Fill out, (7, n): edge, its slope, the outer filter's levels, growth, certainty.
+
+    Growth is how much farther out the edge is with the outer filter's levels than with
+    the inner's, times the certainty that the paper there has no shade.
+    """
+    count = len(strip)
+    levels = np.empty((6, count))
+    _levels(strip, filters, levels)
+    _smooth(levels, smooth)
     for i in range(count):
-        inner, outer, shade = levels[0, i], levels[1, i], levels[2, i]
-        if not outer > inner:
-            continue
-        level = 0.5 * (inner + outer) + shade * blur / _ROOT_2PI
-        best = -1
-        for away in range(int(reach / STEP_PX) + 1):
-            for k in (before - 1 - away, before - 1 + away):
-                inside = 1 <= k < columns - 2
-                if inside and strip[i, k] < level <= strip[i, k + 1]:
-                    best = k
-                    break
-            if best >= 0:
+        near, far = levels[:3, i], levels[3:, i]
+        level = 0.5 * (near[0] + near[1]) + near[2] * blur / _ROOT_2PI
+        place, slope = np.nan, np.nan
+        if near[1] > near[0]:
+            place, slope = _crossing(strip[i], before, level, reach)
+        sure = 1.0 / (far[2] ** 2 + (_SHADE * (far[1] - far[0])) ** 2)
+        growth = 0.5 * (far[0] + far[1]) + far[2] * blur / _ROOT_2PI - level
+        out[0, i], out[1, i] = place, slope
+        out[2:5, i] = far
+        out[5, i], out[6, i] = sure * growth / slope, sure
+
+
+@njit(cache=True)
+def _crossing(
+    profile: Image, before: int, level: float, reach: float
+) -> tuple[float, float]:
+    """Find the crossing nearest to the expected place; fit a line through 4 samples.
+
+    Returns its place and the slope there; NaN where the profile does not cross.
+    """
+    best = -1
+    for away in range(int(reach / STEP_PX) + 1):
+        for k in (before - 1 - away, before - 1 + away):
+            inside = 1 <= k < profile.size - 2
+            if inside and profile[k] < level <= profile[k + 1]:
+                best = k
                 break
-        if best < 0:
-            continue
-        a, b = strip[i, best - 1], strip[i, best]
-        c, d = strip[i, best + 1], strip[i, best + 2]
-        slope = (0.3 * (d - a) + 0.1 * (c - b)) / STEP_PX
-        if not slope > 0.0:
-            continue
-        middle = (best - before + 1) * STEP_PX
-        place = middle + (level - 0.25 * (a + b + c + d)) / slope
-        if abs(place - middle) > STEP_PX:
-            place = middle - 0.5 * STEP_PX + (level - b) / (c - b) * STEP_PX
-        out[0, i] = place
-        out[1, i] = slope
+        if best >= 0:
+            break
+    if best < 0:
+        return np.nan, np.nan
+    a, b = profile[best - 1], profile[best]
+    c, d = profile[best + 1], profile[best + 2]
+    slope = (0.3 * (d - a) + 0.1 * (c - b)) / STEP_PX
+    if not slope > 0.0:
+        return np.nan, np.nan
+    middle = (best - before + 1) * STEP_PX
+    place = middle + (level - 0.25 * (a + b + c + d)) / slope
+    if abs(place - middle) > STEP_PX:
+        place = middle - 0.5 * STEP_PX + (level - b) / (c - b) * STEP_PX
+    return place, slope

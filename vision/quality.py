@@ -32,7 +32,7 @@ def refusal(photo: Photo, refined: Refined, candidate: Candidate) -> None:
         With flag and reason.
     """
     length = float(refined.fit.curve.s[-1])
-    width = float(np.median(refined.width[refined.good]))
+    width = refined.typical_width
     if not 0.8 < length / candidate.length_px < 1.5 + 8.0 * width / length:
         raise LostError(
             "inconsistent",
@@ -91,7 +91,7 @@ def _goes_on(photo: Photo, refined: Refined) -> bool:
 
     Then that line may be the border of a shadow (or the clamp has an open groove).
     """
-    width = float(np.median(refined.width[refined.good]))
+    width = refined.typical_width
     beside = 0.5 * width + 4.0
     across = np.array([-beside, -0.2 * width, 0.0, 0.2 * width, beside])
     curve = refined.fit.curve

@@ -84,6 +84,11 @@ class Refined:
     tip: EndFace
     clamp: ClampLines | None
 
+    @property
+    def typical_width(self) -> float:
+        """Median width where edges were used."""
+        return median(self.width[self.good])
+
 
 @dataclass(slots=True)
 class _State:
@@ -340,7 +345,7 @@ def _fit(
         if outlying.any() and left.sum() > 0.5 * weights.sum():
             weights = left
             fit = fitted(weights)
-    return fit, weights > 0.5 * np.median(weights)
+    return fit, weights > 0.5 * median(weights)
 
 
 @njit(cache=True)

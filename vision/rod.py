@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..core.jit import njit
 from .binarise import Binary
+from .robust import median
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
@@ -234,14 +235,14 @@ def _half_widths(ridge: NDArray[np.float32]) -> tuple[float, float]:
     width = np.exp(0.09 * (lowest + np.arange(len(near))))
     score = near / np.sqrt(width)
     best = int(np.argmax(score))
-    common = float(np.median(ridge[np.abs(bins - best) <= 2]))
+    common = median(ridge[np.abs(bins - best) <= 2])
     below = best - _HALVED
     if below <= 0:
         return common, 0.0
     second = int(np.argmax(score[:below]))
     if near[second] < 2.0 * LEAST_SLENDERNESS * width[second]:
         return common, 0.0
-    return common, float(np.median(ridge[np.abs(bins - second) <= 2]))
+    return common, median(ridge[np.abs(bins - second) <= 2])
 
 
 @njit(cache=True)
@@ -311,7 +312,7 @@ def _trace(
         length_px=length * f,
         root=root,
         contacts=contacts + border_contacts,
-        ratio=float(np.median(light)) if light.size else 1.0,
+        ratio=median(light) if light.size else 1.0,
     )
 
 
@@ -368,7 +369,7 @@ def _level_sets(piece: Mask, seeds: Mask | None, half: float) -> Array | None:
     if np.any(count == 0):
         return None
     curve = sums[:, 1:] / count[:, None]
-    return curve[:-1] if count[-1] < 0.5 * np.median(count) else curve
+    return curve[:-1] if count[-1] < 0.5 * median(count) else curve
 
 
 @njit(cache=True)

@@ -21,6 +21,7 @@ from .calibration import Calibration
 from .curve import Curve
 from .measurement import Measurement, Pose
 from .refine import APART_PX, LostError, Refined, is_face
+from .robust import median
 from .rod import Candidate
 
 Array = NDArray[np.float64]
@@ -102,23 +103,13 @@ def measurement(
     refined: Refined, candidate: Candidate, setting: Setting
 ) -> Measurement:
     """Return the measurement of a refined rod, without doubts yet."""
-    curve = refined.fit.curve
-    width = float(np.median(refined.width[refined.good]))
     if setting.calibration is None:
-        first, last = _ends_px(refined)
-        return _uncalibrated(refined, first, last, width)
-    return _calibrated(refined, setting, setting.calibration, curve)
+        return _uncalibrated(refined)
+    return _calibrated(refined, setting, setting.calibration)
 
 
-def _ends_px(refined: Refined) -> tuple[float, float]:
-    """Arc lengths of clamp and tip with nothing known of the camera."""
-    return 0.0, refined.tip.s
-
-
-def _uncalibrated(
-    refined: Refined, first: float, last: float, width: float
-) -> Measurement:
-    s = np.linspace(first, last, POINTS)
+def _uncalibrated(refined: Refined) -> Measurement:
+    s = np.linspace(0.0, refined.tip.s, POINTS)
     points, theta = refined.fit.curve.at(s)
     table = _pixel_columns(refined, s, points, theta)
     empty = np.full(POINTS, np.nan)
@@ -129,8 +120,8 @@ def _uncalibrated(
     return Measurement(
         status="ok",
         points=table,
-        length_px=last - first,
-        width_px=width,
+        length_px=refined.tip.s,
+        width_px=refined.typical_width,
         clamp_px=(float(points[0, 0]), float(points[0, 1])),
         tip_px=(float(points[-1, 0]), float(points[-1, 1])),
     )
@@ -160,13 +151,12 @@ def _pixel_columns(
     }
 
 
-def _calibrated(
-    refined: Refined, setting: Setting, camera: Calibration, curve: Curve
-) -> Measurement:
+def _calibrated(refined: Refined, setting: Setting, camera: Calibration) -> Measurement:
+    curve = refined.fit.curve
     height = setting.rod_height_mm
     ends = _local(camera, curve.points[[0, -1]], curve.theta[[0, -1]], height)
     silhouette = ends.across + np.abs(ends.rise_across)
-    side_mm = float(np.median(refined.width[refined.good]) / silhouette.mean())
+    side_mm = refined.typical_width / float(silhouette.mean())
     last = refined.tip.s - 0.5 * side_mm * abs(float(ends.rise_along[1]))
     first = _root(refined, ends, setting, side_mm)
     s = np.linspace(first, last, 4 * POINTS)
@@ -227,14 +217,14 @@ def _in_frame(
         length_mm=float(s_mm[-1]),
         tip_mm=(float(own[-1, 0]), float(own[-1, 1])),
         tip_angle_deg=float(np.degrees(heading[-1] - heading[0])),
-        width_mm=float(np.median(table["width_mm"][table["good"] > 0.5])),
+        width_mm=median(table["width_mm"][table["good"] > 0.5]),
         clamp_angle_sd_deg=_clamp_sd_deg(
             refined,
             np.interp(grid.s, s_px, wall),
             _hidden_px(refined, setting, float(local.rise_along[0])),
         ),
         length_px=float(s[-1] - s[0]),
-        width_px=float(np.median(refined.width[refined.good])),
+        width_px=refined.typical_width,
         clamp_px=(float(points[0, 0]), float(points[0, 1])),
         tip_px=(float(points[-1, 0]), float(points[-1, 1])),
         pose=pose,

@@ -7,6 +7,7 @@ between rod and paper, and a straight line through the crossings is the end face
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -143,25 +144,23 @@ def find_tip(
 
 def line_through(across: Array, crossing: Array) -> EndFace | None:
     """Fit a line to lane crossings, the worst ones dropped."""
-    found = np.isfinite(crossing)
-    if np.count_nonzero(found) < 0.5 * len(crossing):
+    found = float(np.isfinite(crossing).mean())
+    if found < 0.5:
         return None
-    place, slope, scatter, used = _fit_line(across, crossing, found)
+    place, slope, scatter, used = _fit_line(across, crossing)
     return EndFace(
         s=place,
-        sigma=float(scatter / np.sqrt(used) + 0.005),
+        sigma=scatter / math.sqrt(used) + 0.005,
         skew=slope,
         scatter=scatter,
-        found=float(found.mean()),
+        found=found,
     )
 
 
 @njit(cache=True)
-def _fit_line(
-    across: Array, crossing: Array, found: NDArray[np.bool_]
-) -> tuple[float, float, float, int]:
+def _fit_line(across: Array, crossing: Array) -> tuple[float, float, float, int]:
     """Return place, slope, scatter and number of crossings of the line's last fit."""
-    good = found
+    good = np.isfinite(crossing)
     residual = np.empty(len(across))
     place, slope, used = 0.0, 0.0, 0
     for _ in range(3):

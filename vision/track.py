@@ -16,6 +16,7 @@ from ..core.jit import njit
 from .centreline_fit import SHARED, fit_curve
 from .curve import Curve
 from .edges import SHADED_LEVEL, STEP_PX, _bilinear, rough_edges
+from .robust import median
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -75,7 +76,7 @@ def start_curve(
     found = np.isfinite(across) & (across > 1.0)
     if found.sum() < 0.5 * len(across):
         return None
-    real = float(np.median(across[found]))
+    real = median(across[found])
     good = found & (np.abs(across - real) < 0.3 * real + 1.0)
     if good.sum() < 0.5 * len(across):
         return None
