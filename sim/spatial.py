@@ -46,6 +46,12 @@ Array = NDArray[np.float64]
 REACH_LIMIT = 30.0
 """Largest sum of h sqrt(P / EI): beyond, a tip's pose no longer fixes the root's."""
 
+LOADS = [AXIAL, MU1, MU2, WX, WY, WZ]
+"""Columns of the rod's table that are loads."""
+
+PLACE = [12, 13, 14, 2, 5, 8]
+"""Position and tangent among a station's numbers."""
+
 TURN_LIMIT = 300.0
 """Largest turn of the unloaded rod, in rad."""
 
@@ -180,30 +186,38 @@ def solve_spatial(
     cos, sin = math.cos(angle), math.sin(angle)
     clamp = np.array([[-sin, 0.0, cos], [cos, 0.0, sin], [0.0, 1.0, 0.0]])
     s = stations(points)
-    direction = clamp[:, 2]
-    if flux[0] != 0.0 and touches(flux, margin, s, _straight(s, direction)):
+    unloaded = _unloaded(table, clamp, s)
+    if flux[0] != 0.0 and touches(flux, margin, s, unloaded):
         raise InputError(
             "gap_mm must leave the undeformed rod clear of the magnet, with half its "
             f"side to spare; instead received {getattr(field, 'gap_mm', math.nan):g} mm"
         )
-    n = _steps(table, flux, clamp[:, 2])
+    n = _steps(table, flux, unloaded[-1, :3])
     rest = flux, n, clamp, margin, s
     index, load, error, states = _equilibrium(table, *rest)
     if index < 0:
-        scaled = [AXIAL, MU1, MU2, WX, WY, WZ]
 
         def clear(part: float) -> bool:
             less = table.copy()
-            less[:, scaled] *= part
+            less[:, LOADS] *= part
             return _equilibrium(less, *rest)[0] >= 0
 
-        return _gone(flux, L, load_before_touching(load, clear), direction)
+        return _gone(flux, L, load_before_touching(load, clear), unloaded[-1])
     return _solution(rod, table, flux, s, states, index, error)
 
 
-def _straight(s: Array, direction: Array) -> Array:
-    """Return positions and tangents of the straight rod, shape (n, 6)."""
-    return np.hstack([np.outer(s, direction), np.tile(direction, (len(s), 1))])
+def _unloaded(table: Array, clamp: Array, s: Array) -> Array:
+    """Return positions and tangents of the unloaded rod, shape (n, 6)."""
+    direction = clamp[:, 2]
+    if not np.any(table[:, K1 : K3 + 1]):
+        return np.hstack([np.outer(s, direction), np.tile(direction, (len(s), 1))])
+    bare, nothing = table.copy(), np.zeros(1 + BLOCK_SIZE)
+    bare[:, LOADS] = 0.0
+    n = _steps(bare, nothing, direction)
+    R, r, states = np.empty((3, 3)), np.empty(3), np.empty((len(s), 18))
+    solve_pose(bare, nothing, n, clamp, R, r)
+    shape(bare, nothing, 2 * n, R, r, s, states)
+    return states[:, PLACE]
 
 
 def _equilibrium(
@@ -215,7 +229,7 @@ def _equilibrium(
     states = np.empty((len(s), 18))
     if index >= 0:
         shape(table, flux, 2 * n, R, r, s, states)
-        if touches(flux, margin, s, states[:, [12, 13, 14, 2, 5, 8]]):
+        if touches(flux, margin, s, states[:, PLACE]):
             index = -1
     return index, load, error, states
 

@@ -283,8 +283,23 @@ def test_a_magnet_above_is_touched_between_points_too(points, clearance_mm) -> N
     z_mm = (1.0 - np.cos(turn)) / 0.03 - clearance_mm * np.cos(turn)
     cube = Magnet.cube(2.0, 1e-6, offset_mm=(x_mm - 18.0, 0.0, z_mm - 1.0))
     field = MagnetField(magnet=replace(cube, axis_angle_deg=0.0), gap_mm=10.0)
-    space = solve_spatial(rod, field, points=points)
-    assert (len(space.s_mm) > 0) == (clearance_mm > 0.5)
+    if clearance_mm > 0.5:
+        assert len(solve_spatial(rod, field, points=points).s_mm) == points
+        return
+    with pytest.raises(InputError, match="undeformed rod clear of the magnet"):
+        solve_spatial(rod, field, points=points)
+
+
+def test_a_magnet_in_the_way_of_the_straight_rod_only_is_no_hindrance() -> None:
+    """What counts before the load is the rest shape, here a quarter of a circle."""
+    rest = (0.0, np.pi / 60.0, 0.0)
+    rod = SpatialRod(sections=(section(length_mm=30.0, rest_curvature_per_mm=rest),))
+    ahead = MagnetField(magnet=Magnet.cube(4.0, 1e-6, axis_angle_deg=180.0), gap_mm=3.0)
+    before = replace(ahead, magnet=replace(ahead.magnet, offset_mm=(-10.0, 0.0, 0.0)))
+    space = solve_spatial(rod, before)
+    assert space.r_mm[-1, :2] == pytest.approx([60.0 / np.pi] * 2, abs=1e-4)
+    with pytest.raises(InputError, match="undeformed rod clear"):
+        solve_spatial(replace(rod, sections=(section(length_mm=30.0),)), before)
 
 
 def test_bad_input_is_refused() -> None:
