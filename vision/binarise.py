@@ -133,22 +133,29 @@ def _background(
     basis = _quadric(*sample.shape)
     value = sample.astype(np.float64).ravel()
     lower, typical, upper = _quantiles(value, 0.4, 0.6, 0.7)
-    inside = value > lower
-    fit = np.zeros_like(value)
-    for band in (0.25, 0.15, 0.1, 0.1):
-        design = basis * inside[:, None]
-        normal = design.T @ design + 1e-9 * np.eye(6)
-        coefficients = np.asarray(
-            np.linalg.solve(normal, design.T @ value), dtype=np.float64
-        )
-        fit = basis @ coefficients
-        level = np.maximum(fit, 1e-3)
-        inside = np.abs(value - fit) < band * level
-        if inside.sum() < 60:
-            coefficients = np.array([upper, 0, 0, 0, 0, 0])
-            break
+    coefficients = _fit_quadric(basis, value, lower, upper)
     floor = max(0.2 * typical, 1e-4)
     return coefficients.astype(np.float32), np.float32(floor)
+
+
+@njit(cache=True)
+def _fit_quadric(
+    basis: NDArray[np.float64], value: NDArray[np.float64], lower: float, upper: float
+) -> NDArray[np.floating]:
+    """Fit what lies above `lower` and then in ever closer bands; else flat `upper`."""
+    coefficients: NDArray[np.floating] = np.zeros(6)
+    inside = value > lower
+    for band in (0.25, 0.15, 0.1, 0.1):
+        design = basis[inside]
+        normal = design.T @ design + 1e-9 * np.eye(6)
+        coefficients = np.linalg.solve(normal, design.T @ value[inside])
+        fit = basis @ coefficients
+        inside = np.abs(value - fit) < band * np.maximum(fit, 1e-3)
+        if inside.sum() < 60:
+            coefficients[:] = 0.0
+            coefficients[0] = upper
+            break
+    return coefficients
 
 
 @lru_cache(maxsize=8)
