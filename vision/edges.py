@@ -150,9 +150,7 @@ def find_edges(
     # profile reaches no further in than the axis.
     before = max(int(min(span, half) / STEP_PX + 0.5), 2)
     strip = np.empty((len(points), before + int(span / STEP_PX) + 1), np.float32)
-    filters = np.concatenate(
-        [_level_filter(strip.shape[1], before, gap, window, blur) for gap in gaps]
-    )
+    filters = _level_filters(strip.shape[1], before, gaps, window, blur)
     out = np.empty((2, 7, len(points)))
     for side, (outwards, edge) in enumerate(((-1.0, low), (1.0, high))):
         _sample(grey, points, normals, edge, outwards, before, np.float32(sign), strip)
@@ -232,6 +230,17 @@ def _dark_within(strip: Image, count: int, level: float) -> tuple[Array, Array]:
     low = np.where(some, offsets[np.argmax(inside, axis=1)], np.nan)
     high = np.where(some, offsets[::-1][np.argmax(inside[:, ::-1], axis=1)], np.nan)
     return low - 0.5 * STEP_PX, high + 0.5 * STEP_PX
+
+
+@njit(cache=True)
+def _level_filters(
+    columns: int, before: int, gaps: tuple[float, float], window: float, blur: float
+) -> Array:
+    """Return the weights of both filters, (6, m): near the edge, then clear of it."""
+    filters = np.empty((6, columns))
+    filters[:3] = _level_filter(columns, before, gaps[0], window, blur)
+    filters[3:] = _level_filter(columns, before, gaps[1], window, blur)
+    return filters
 
 
 @njit(cache=True)

@@ -144,8 +144,8 @@ def find_tip(
 
 def line_through(across: Array, crossing: Array) -> EndFace | None:
     """Fit a line to lane crossings, the worst ones dropped."""
-    found = float(np.isfinite(crossing).mean())
-    if found < 0.5:
+    found = int(np.count_nonzero(np.isfinite(crossing)))
+    if found < 0.5 * len(crossing):
         return None
     place, slope, scatter, used = _fit_line(across, crossing)
     return EndFace(
@@ -153,7 +153,7 @@ def line_through(across: Array, crossing: Array) -> EndFace | None:
         sigma=scatter / math.sqrt(used) + 0.005,
         skew=slope,
         scatter=scatter,
-        found=found,
+        found=found / len(crossing),
     )
 
 
@@ -217,8 +217,8 @@ def crossings_of(
     ndarray, shape (k,)
         NaN where a lane does not cross.
     """
-    out = np.full(len(light), np.nan)
     step = float(s[1] - s[0])
+    out = np.empty(len(light))
     _cross_lanes(light, (place - s[0]) / step, near / step, inner / step, outer / step,
                  reach / step, out)  # fmt: skip
     return np.asarray(s[0] + step * out)
@@ -231,6 +231,7 @@ def _cross_lanes(
 ) -> None:  # fmt: skip
     """Everything in samples."""
     count, columns = light.shape
+    out[:] = np.nan
     for i in range(count):
         low = _mean(light, i, place - near - inner, place - near)
         high = _line(light, i, place + near, place + near + outer, place)
