@@ -335,7 +335,17 @@ def _block_walls(block: Block, camera: Calibration) -> Picture:
             for height in (0.0, block.height_mm)
         ]
     )
-    return coverage(_hull(pixels), *camera.image_size_px)
+    size = camera.image_size_px
+    top = camera.to_px(_subdivide(corners), height_mm=block.height_mm)
+    return _beside(coverage(_hull(pixels), *size), coverage(top, *size))
+
+
+def _beside(whole: Picture, top: Picture) -> Picture:
+    """Return where walls must be laid before the top: not where both end together.
+
+    There each would cover its share of the pixel, and the edge move out by a sixth.
+    """
+    return np.where(whole > top + 1e-3, whole, np.float32(0.0))
 
 
 def _draw_top(picture: Picture, block: Block, camera: Calibration) -> None:
@@ -397,7 +407,7 @@ def _draw_rod(picture: Picture, scene: Scene, camera: Calibration) -> None:
         )
     top = coverage(_rod_outline(scene, camera, levels[-1]), *size)
     np.maximum(walls, top, out=walls)
-    _paint(picture, walls, _scaled(RUBBER, 0.75))
+    _paint(picture, _beside(walls, top), _scaled(RUBBER, 0.75))
     _paint(picture, top, RUBBER)
     if scene.light.gloss > 0.0:
         _draw_gloss(picture, scene, camera, levels[-1])
