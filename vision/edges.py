@@ -142,9 +142,8 @@ def find_edges(
         NaN where no edge was found.
     """
     half = 0.5 * (median(high) - median(low))
-    wide = max(blur, fuzz)
-    gaps = max(0.6, 1.1 * wide), max(1.5, 2.2 * wide)
-    window = max(4.0, 3.0 * wide)
+    gap, window = level_span(blur, fuzz)
+    gaps = max(0.6, 1.1 * max(blur, fuzz)), gap
     span = max(reach + 1.0, gaps[1] + window)
     # Samples lie a quarter of a pixel and more to either side of the expected edge; a
     # profile reaches no further in than the axis.
@@ -230,6 +229,12 @@ def _dark_within(strip: Image, count: int, level: float) -> tuple[Array, Array]:
     low = np.where(some, offsets[np.argmax(inside, axis=1)], np.nan)
     high = np.where(some, offsets[::-1][np.argmax(inside[:, ::-1], axis=1)], np.nan)
     return low - 0.5 * STEP_PX, high + 0.5 * STEP_PX
+
+
+def level_span(blur: float, fuzz: float) -> tuple[float, float]:
+    """Return how far from the edge levels are taken, and over how much, in px."""
+    wide = max(blur, fuzz)
+    return max(1.5, 2.2 * wide), max(4.0, 3.0 * wide)
 
 
 @njit(cache=True)

@@ -112,11 +112,14 @@ def _extract(
     if start is None:
         raise LostError("edges_lost", "the rod has no two edges against the paper")
 
+    calibrated = setting.calibration is not None
+
     def joints(curve: Curve) -> Sequence[float]:
         return setting.joints_px(curve)
 
     refined = refine(
         photo.grey, start, root=candidate.root, sign=sign, joints=joints,
+        walls=setting.walls_px if calibrated and not binary.inverted else None,
         face_px=setting.face_px(start.curve),
     )  # fmt: skip
     refusal(photo, refined, candidate)

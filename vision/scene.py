@@ -34,6 +34,8 @@ BLACK: Colour = (0.045, 0.045, 0.045)
 PAPER: Colour = (0.70, 0.71, 0.71)
 RUBBER: Colour = (0.048, 0.048, 0.048)
 
+SHEEN = 0.13
+"""What a wall of the rod mirrors of the paper to a camera that grazes it, in light."""
 _MOSAIC = 0.6
 """Noise that three channels share, over the noise of one alone: about 1/sqrt(3)."""
 
@@ -407,10 +409,26 @@ def _draw_rod(picture: Picture, scene: Scene, camera: Calibration) -> None:
         )
     top = coverage(_rod_outline(scene, camera, levels[-1]), *size)
     np.maximum(walls, top, out=walls)
-    _paint(picture, _beside(walls, top), _scaled(RUBBER, 0.75))
+    walls = _beside(walls, top)
+    _paint(picture, walls, _scaled(RUBBER, 0.75))
+    picture += (SHEEN * walls * _from_clamp(scene, camera))[..., None]
     _paint(picture, top, RUBBER)
     if scene.light.gloss > 0.0:
         _draw_gloss(picture, scene, camera, levels[-1])
+
+
+def _from_clamp(scene: Scene, camera: Calibration) -> Picture:
+    """Return how much of the paper a rod's walls mirror: 0 beside the clamp, then 1."""
+    ends = np.array([[0.0, 0.0], [scene.side_mm, 0.0]])
+    root, ahead = camera.to_px(
+        scene.clamp.pose.to_board(ends), height_mm=scene.clamp.pose.height_mm
+    )
+    x, y = (ahead - root) / np.sum((ahead - root) ** 2)
+    width, height = camera.image_size_px
+    away = np.add.outer(
+        y * (np.arange(height) - root[1]), x * (np.arange(width) - root[0])
+    )
+    return np.asarray(1.0 - np.exp(-np.maximum(away, 0.0)), dtype=np.float32)
 
 
 def _draw_gloss(

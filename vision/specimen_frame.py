@@ -76,6 +76,16 @@ class Setting:
         s_mm = _arc(points)
         return [float(np.interp(joint, s_mm, curve.s)) for joint in self.joints_mm]
 
+    def walls_px(self, points: Array, theta: Array, width_px: float) -> Array:
+        """Return how wide the side walls are seen, positive on the left; see `refine`.
+
+        Only with a calibration.
+        """
+        if self.calibration is None:
+            return np.zeros(len(points))
+        local = _local(self.calibration, points, theta, self.rod_height_mm)
+        return local.rise_across * width_px / local.silhouette
+
     def face_px(self, curve: Curve) -> float:
         """Return how much of a clamp's face may be seen at the root of a curve."""
         if self.calibration is None:
@@ -97,6 +107,11 @@ class _Local:
     across: Array
     rise_along: Array
     rise_across: Array
+
+    @property
+    def silhouette(self) -> Array:
+        """Pixels between the edges of a rod per mm of its side."""
+        return self.across + np.abs(self.rise_across)
 
 
 def measurement(
@@ -155,8 +170,7 @@ def _calibrated(refined: Refined, setting: Setting, camera: Calibration) -> Meas
     curve = refined.fit.curve
     height = setting.rod_height_mm
     ends = _local(camera, curve.points[[0, -1]], curve.theta[[0, -1]], height)
-    silhouette = ends.across + np.abs(ends.rise_across)
-    side_mm = refined.typical_width / float(silhouette.mean())
+    side_mm = refined.typical_width / float(ends.silhouette.mean())
     last = refined.tip.s - 0.5 * side_mm * abs(float(ends.rise_along[1]))
     first = _root(refined, ends, setting, side_mm)
     s = np.linspace(first, last, 4 * POINTS)
@@ -197,7 +211,7 @@ def _in_frame(
     table = _pixel_columns(refined, s_px, pixel, angle)
     scale = np.interp(even, s_mm, stretch)
     local = _local(camera, pixel, angle, height)
-    across = local.across + np.abs(local.rise_across)
+    across = local.silhouette
     wall = np.abs(local.rise_across) * table["width_px"] / across
     table["sigma_px"] = np.hypot(table["sigma_px"], SIDE_FACE * wall)
     table |= {

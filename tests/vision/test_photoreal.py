@@ -34,16 +34,17 @@ def test_one_board_tells_a_tilted_camera_with_a_barrel_lens(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "rms_mm", "tip_mm"),
+    ("name", "rms_px", "rms_mm", "tip_mm"),
     [
         # Bent at once behind the clamp, its direction there is known to 2 degrees.
-        ("ph_C11", 0.25, 0.65),
-        ("ph_C13", 0.05, 0.10),
-        ("ph_D18", 0.015, 0.04),
-        ("ph_D20", 0.02, 0.04),
+        ("ph_C11", 0.12, 0.25, 0.65),
+        ("ph_C13", 0.12, 0.02, 0.05),
+        # Its wall lies in a deep shadow and mirrors less paper than walls do.
+        ("ph_D18", 0.20, 0.10, 0.20),
+        ("ph_D20", 0.12, 0.02, 0.04),
     ],
 )
-def test_hard_photographs_are_measured(name, rms_mm, tip_mm):
+def test_hard_photographs_are_measured(name, rms_px, rms_mm, tip_mm):
     place = FOLDER / f"camera_{name[3].lower()}"
     truth = json.loads((place / f"{name}.json").read_text())
     result = extract(
@@ -54,10 +55,12 @@ def test_hard_photographs_are_measured(name, rms_mm, tip_mm):
     assert not {"clamp_doubtful", "root_hidden", "rough_edges"} & set(result.flags)
     true_px = np.array(truth["centreline_px"])
     in_picture = signed_distance(result.points_px, true_px)
-    assert np.sqrt(np.mean(in_picture**2)) < 0.12
+    assert np.sqrt(np.mean(in_picture**2)) < rms_px
     assert np.hypot(*np.subtract(result.tip_px, truth["tip_px"])) < 0.6
     assert result.length_mm == pytest.approx(truth["length_mm"], abs=0.03)
     assert result.width_mm == pytest.approx(truth["side_mm"], abs=0.022)
+    if rms_mm > 0.05:
+        assert "direction_doubtful" in result.flags
     line = np.array(truth["centreline_mm"])
     xy = np.column_stack([result.points["x_mm"], result.points["y_mm"]])
     assert np.sqrt(np.mean(signed_distance(xy, line) ** 2)) < rms_mm

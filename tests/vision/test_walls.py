@@ -1,0 +1,69 @@
+"""The side walls of a rod seen obliquely: where they end, and what light they give."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from magbend.core.centreline import Centreline
+from magbend.vision import as_photo, extract, refine, scene
+from magbend.vision.measurement import Pose
+from magbend.vision.refine import _short_of_end
+
+S = np.linspace(0.0, 30.0, 301)
+ZERO = np.zeros_like(S)
+STRAIGHT = Centreline(
+    s_mm=S, x_mm=S, y_mm=ZERO, theta_rad=ZERO, kappa_per_mm=ZERO
+)  # fmt: skip
+
+
+def phi(z):
+    return 0.5 * (1.0 + math.erf(z / math.sqrt(2.0)))
+
+
+@pytest.mark.parametrize("wall", [0.3, 1.0, 2.2, 4.0])
+def test_half_level_of_two_steps(wall):
+    gap, window, blur, light = 2.0, 4.0, 0.9, 0.17
+    (x,) = _short_of_end(np.array([wall]), np.array([light]), blur, gap, window)
+    level = (1.0 - light) * phi(-x / blur) + light * phi((wall - x) / blur)
+    part = min(max((wall - gap) / window, 0.0), 1.0)
+    assert level == pytest.approx(0.5 * (1.0 + light * part), abs=1e-12)
+    assert 0.0 < x <= light * wall * 1.5
+
+
+def test_no_wall_and_a_wall_wider_than_where_the_rods_level_is_taken():
+    walls = np.array([0.0, 40.0])
+    short = _short_of_end(walls, np.full(2, 0.17), 0.9, 2.0, 4.0)
+    assert short == pytest.approx(0.0, abs=1e-9)
+
+
+def measured(toward_deg, seed=0):
+    """Return the error of the midline, px, and the width, mm, of a straight rod."""
+    camera = scene.scene_camera(tilt_deg=6.0, tilt_direction_deg=toward_deg)
+    clamp = scene.Block(pose=Pose(x_mm=16.0, y_mm=-25.0, angle_deg=0.0, height_mm=0.9))
+    light = scene.SceneLight(shadow_depth=0.0, noise=5e-4)
+    bench = scene.Scene(clamp=clamp, centreline=STRAIGHT, light=light, dust=0)
+    picture = scene.render_scene(bench, camera, np.random.default_rng(seed))
+    found = extract(as_photo(picture), camera, rod_height_mm=0.9)
+    true = camera.to_px(clamp.pose.to_board(STRAIGHT.points_mm), height_mm=0.9)
+    x, y = found.points["x_px"], found.points["y_px"]
+    error = (y - np.interp(x, true[:, 0], true[:, 1]))[found.points["s_mm"] > 4.0]
+    return float(np.median(error)), found.width_mm
+
+
+@pytest.mark.parametrize("toward_deg", [90.0, -90.0])
+def test_the_middle_is_the_axis_from_either_side(toward_deg):
+    error, width = measured(toward_deg)
+    assert abs(error) < 0.04
+    assert width == pytest.approx(1.0, abs=0.004)
+
+
+@pytest.mark.parametrize("toward_deg", [90.0, -90.0])
+def test_scenes_draw_walls_as_dark_as_the_top_where_they_are(monkeypatch, toward_deg):
+    monkeypatch.setattr(scene, "SHEEN", 0.0)
+    monkeypatch.setattr(refine, "WALL_LIGHT", 0.0)
+    error, width = measured(toward_deg)
+    assert abs(error) < 0.02
+    assert width == pytest.approx(1.0, abs=0.003)
