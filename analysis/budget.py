@@ -16,7 +16,7 @@ import numpy as np
 from .. import sim
 from ..core.errors import MagbendError
 from ..core.specimen import Specimen
-from .compare import Comparison, RunComparison, usable_flux
+from .compare import Comparison, RunComparison, remanence_sd_T, usable_flux
 from .fit import FitResult
 from .nuisance import FRAME_ANGLE_SD_DEG, Nuisance
 
@@ -168,7 +168,7 @@ def _causes(
          f"{a['clamp_angle_deg']:g} deg, assumed"),
     ]  # fmt: skip
     if isinstance(field, sim.MagnetField):
-        remanence_sd = run.magnet_fit.remanence_sd_T if run.magnet_fit else 0.01
+        remanence_sd = remanence_sd_T(run.magnet_fit) if run.magnet_fit else 0.01
         source = "fit to the readings" if run.magnet_fit else "assumed"
         causes += [
             (["magnet.remanence_T"], [remanence_sd], "remanence of the magnet",

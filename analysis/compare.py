@@ -51,6 +51,10 @@ remeasured sides differ by up to 7 % from the nominal ones."""
 USABLE_FLUX = ("ok", "manual", "none")
 
 
+UNSTATED = 0.01
+"""Relative sd of a remanence from one reading without an sd: what hand meters claim."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Descriptors:
     """Numbers of one shape: radius, circularity and the paper's parabola."""
@@ -242,6 +246,12 @@ def fit_run_magnet(
         sd_mT=sd if all(math.isfinite(value) and value > 0.0 for value in sd) else None,
     )
     return fit, replace(run.magnet, remanence_T=fit.remanence_T)
+
+
+def remanence_sd_T(fit: sim.MagnetFit) -> float:
+    """Return how sure a run's remanence is; one reading alone may not tell."""
+    stated = fit.remanence_sd_T
+    return stated if math.isfinite(stated) else UNSTATED * abs(fit.remanence_T)
 
 
 def usable_flux(step: Step) -> bool:

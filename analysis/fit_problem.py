@@ -19,7 +19,7 @@ from ..core.centreline import Centreline
 from ..core.errors import InputError, StoreError
 from ..core.magnet import Magnet
 from ..core.specimen import Specimen
-from .compare import field_of, fit_run_magnet, frame_problem
+from .compare import field_of, fit_run_magnet, frame_problem, remanence_sd_T
 from .load import RunData, Step
 from .nuisance import Nuisance
 
@@ -171,7 +171,7 @@ def build_problem(
     magnet_sd: list[float] = []
     for index, run in enumerate(runs):
         fit, magnet = fit_run_magnet(run)
-        relative = fit.remanence_sd_T / fit.remanence_T if fit else 0.0
+        relative = remanence_sd_T(fit) / fit.remanence_T if fit else 0.0
         magnet_sd.append(math.hypot(100.0 * relative, nuisance.magnet_percent))
         slope = _remanence_per_mm(run)
         for step in run.steps:

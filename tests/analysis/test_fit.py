@@ -158,6 +158,21 @@ def test_intervals_hold_on_photographs(tmp_path: Path) -> None:
     assert ratio < 2.5
 
 
+def test_one_reading_that_states_no_deviation_leaves_the_magnet_in_doubt(
+    tmp_path: Path,
+) -> None:
+    run = load_run(write_run(tmp_path / "run", gaps_mm=(60.0,)))
+    bare = replace(run, steps=(replace(run.steps[0], flux_sd_mT=math.nan),))
+    problem = build_problem([bare], model="magnet")
+    sds = [
+        sd
+        for item, sd in zip(problem.nuisances, problem.nuisance_sd, strict=True)
+        if "magnet" in str(item)
+    ]
+    assert sds
+    assert max(sds) >= 1.0  # percent
+
+
 def test_without_noise_the_moduli_are_exact(tmp_path: Path) -> None:
     nominal = sim.gmc(2)
     truth = hidden(nominal, 1.1, 0.9, 1.2)
