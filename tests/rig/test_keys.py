@@ -17,6 +17,15 @@ from magbend.cli.keyboard import END, Keyboard
 needs_pty = pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs POSIX")
 
 
+TAKE_TERMINAL = """
+import os, sys
+os.open(os.ttyname(0), os.O_RDWR)
+os.execv(sys.executable, [sys.executable, *sys.argv[1:]])
+"""
+# A session's first terminal opened is the one whose Ctrl-C it gets. Done in the child's
+# own program: a function between fork and exec upsets threads of other tests' modules.
+
+
 class Terminal:
     """The person's end of a pseudo-terminal, and a program at the other."""
 
@@ -26,9 +35,9 @@ class Terminal:
         self._master, slave = pty.openpty()
         self.seen = ""
         self.process = subprocess.Popen(
-            [sys.executable, *words], stdin=slave, stdout=slave, stderr=slave,
+            [sys.executable, "-c", TAKE_TERMINAL, *words],
+            stdin=slave, stdout=slave, stderr=slave,
             start_new_session=True, cwd=folder,
-            preexec_fn=lambda: _take_terminal(slave),
             env=os.environ | {"MAGBEND_RUNTIME_DIR": str(folder)},
         )  # fmt: skip
         os.close(slave)
@@ -52,13 +61,6 @@ class Terminal:
         self.process.kill()
         self.process.wait()
         os.close(self._master)
-
-
-def _take_terminal(descriptor: int) -> None:
-    import fcntl
-    import termios
-
-    fcntl.ioctl(descriptor, termios.TIOCSCTTY, 0)
 
 
 @pytest.fixture
