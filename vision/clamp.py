@@ -9,7 +9,7 @@ along the rod; `extract` corrects for that, knowing the camera.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,14 @@ class ClampLines:
 
     face: EndFace | None
     front: EndFace | None
+
+    def shifted(self, first: float) -> ClampLines:
+        """Return the lines with arc length counted from `first`."""
+        face, front = (
+            None if line is None else replace(line, s=line.s - first)
+            for line in (self.face, self.front)
+        )
+        return ClampLines(face=face, front=front)
 
 
 def find_clamp(

@@ -16,9 +16,10 @@ from .curve import Curve
 from .measurement import Measurement, failure
 from .photo import Photo
 from .quality import doubts, refusal
-from .refine import LostError, refine
+from .refine import refine
 from .rod import LEAST_SHARE, Candidate, find_candidates
 from .specimen_frame import Setting, measurement
+from .state import LostError
 from .track import start_curve
 
 Array = NDArray[np.float64]

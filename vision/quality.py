@@ -8,10 +8,11 @@ import numpy as np
 
 from .measurement import Measurement
 from .photo import Photo
-from .refine import LostError, Refined
+from .refine import Refined
 from .robust import quantile
 from .rod import Candidate
 from .specimen_frame import Setting, root_hidden
+from .state import LostError
 from .tip import lanes
 
 LENGTH_TOLERANCE = 0.02

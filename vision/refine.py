@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -11,20 +10,22 @@ from numpy.typing import NDArray
 
 from ..core.jit import njit
 from .centreline_fit import SHARED, CurveFit, fit_curve
-from .clamp import ClampLines, find_clamp
+from .clamp import ClampLines
 from .curve import Curve
-from .edges import Edges, find_edges, level_span
+from .edges import Edges, find_edges
+from .ends import find_ends
 from .joints import find_joints
 from .moment import weighed_fit
 from .robust import median
 from .rod import Root
 from .spline import Smooth
-from .tip import EndFace, find_tip
+from .state import LostError, Seen, State
+from .tip import EndFace
 from .track import Start
+from .wall_light import Walls, to_wall_ends
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
-Walls = Callable[[Array, Array, float], Array]
 
 _PASSES = 5
 _ROUGH_PASSES = 2
@@ -34,35 +35,8 @@ _BIN_PX = 4.0
 _BINS = 200
 """Stations are averaged over bins before the fit: so far, or so many on a long rod."""
 
-APART_PX = 2.0
-"""The two lines at a clamp tell different things if they are farther apart."""
-
 ROOT_CLEAR = 0.3
 """Widths next to the clamp that are left out of the fit."""
-
-WALL_LIGHT = 0.17
-"""Light of a side wall that is seen: above the top's, over the paper's above the top's.
-
-The camera grazes the wall, which there mirrors the paper (Fresnel); beside the clamp it
-mirrors the dark clamp, and the light grows from there as 1 - exp(-s / width). Found on
-35 path-traced photographs by two renderers.
-"""
-WALL_PLACES = 25
-
-
-class LostError(Exception):
-    """The edges or an end of the rod got lost; private to this package.
-
-    Parameters
-    ----------
-    flag, reason : str
-        As in `Measurement`.
-    """
-
-    def __init__(self, flag: str, reason: str) -> None:
-        super().__init__(reason)
-        self.flag = flag
-        self.reason = reason
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,31 +73,6 @@ class Refined:
     def typical_width(self) -> float:
         """Median width where edges were used."""
         return median(self.width[self.good])
-
-
-@dataclass(slots=True)
-class _State:
-    """What a pass hands to the next: the curve, half widths along it, and the ends."""
-
-    curve: Curve
-    half: Array
-    width: float
-    first: float
-    last: float
-    face_px: float
-    blur: float = 1.0
-    scatter: float = 0.0
-    fuzz: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class _Seen:
-    """Edges at stations along a curve, and which of them are to be trusted."""
-
-    s: Array
-    theta: Array
-    edges: Edges
-    good: NDArray[np.bool_]
 
 
 def refine(
@@ -163,7 +112,7 @@ def refine(
     """
     half = np.full(len(start.curve.s), 0.5 * start.width)
     last = float(start.curve.s[-1])
-    state = _State(start.curve, half, start.width, 0.0, last, face_px)
+    state = State(start.curve, half, start.width, 0.0, last, face_px)
     for turn in range(_PASSES):
         length = state.last
         result, first = _pass(grey, state, root, sign, joints, walls, turn)
@@ -174,15 +123,15 @@ def refine(
 
 
 def _pass(
-    grey: Image, state: _State, root: Root, sign: float,
+    grey: Image, state: State, root: Root, sign: float,
     joints: Callable[[Curve], Sequence[float]], walls: Walls | None, turn: int,
 ) -> tuple[Refined, float]:  # fmt: skip
     """Return what is seen along the curve, and where on it the rod begins."""
     seen = _look(grey, state, sign, turn)
-    tip, lines, first = _ends(grey, state, seen, root, sign, turn)
+    tip, lines, first = find_ends(grey, state, seen, root, sign, turn)
     clamped = root == "clamp"
     if walls is not None:
-        seen = _to_wall_ends(state, seen, first, walls, clamped=clamped)
+        seen = to_wall_ends(state, seen, first, walls, clamped=clamped)
     fit, used = _fit(state, seen, first, tip.s, joints, turn, clamped=clamped)
     at = fit.curve.s + first
     smooth, sigma = _smooth_width(seen, at, state.width)
@@ -192,11 +141,11 @@ def _pass(
     return Refined(
         fit=fit, shaded=shaded, good=used, width=smooth, sigma_width=sigma,
         tip=replace(tip, s=tip.s - first),
-        clamp=None if lines is None else _shifted(lines, first),
+        clamp=None if lines is None else lines.shifted(first),
     ), first  # fmt: skip
 
 
-def _look(grey: Image, state: _State, sign: float, turn: int) -> _Seen:
+def _look(grey: Image, state: State, sign: float, turn: int) -> Seen:
     """Find the edges along the curve; know its width, blur and roughness after."""
     width = state.width
     step = 2.0 if turn < _ROUGH_PASSES else 1.0
@@ -224,7 +173,7 @@ def _look(grey: Image, state: _State, sign: float, turn: int) -> _Seen:
     blur = edges.blur
     state.blur = float(np.clip(blur, 0.3, 0.5 * state.width)) if blur > 0 else 1.0
     state.scatter = _scatter(edges, int(5.0 / step))
-    return _Seen(s, theta, edges, good)
+    return Seen(s, theta, edges, good)
 
 
 def _scatter(edges: Edges, lag: int) -> float:
@@ -236,134 +185,8 @@ def _scatter(edges: Edges, lag: int) -> float:
     return 1.05 * jump if jump > 0.0 else 0.0
 
 
-def _ends(
-    grey: Image, state: _State, seen: _Seen, root: Root, sign: float, turn: int
-) -> tuple[EndFace, ClampLines | None, float]:  # fmt: skip
-    curve, width = state.curve, state.width
-    outwards = 0.4 * width if turn == 0 else 0.0
-    reach = 1.3 * width if turn == 0 else 0.3 * width + 2.0
-    edges = seen.edges
-    near = seen.good & (seen.s > curve.s[-1] - 3.0 * width)
-    middle = median(edges.middle[near]) if near.any() and turn == 0 else 0.0
-    end = seen.good & (seen.s > curve.s[-1] - 1.5 * width)
-    taper = median(edges.width[end]) if end.sum() > 3 else width
-    tip = find_tip(
-        grey, curve, expected=state.last + outwards, width=min(width, taper),
-        blur=state.blur, reach=reach, middle=middle, sign=sign,
-    )  # fmt: skip
-    if tip is None:
-        raise LostError("no_tip", "the free end of the rod has no edge")
-    if root == "border":
-        return tip, None, _border_crossing(grey, curve)
-    if root == "free":
-        return tip, None, _other_end(grey, state, sign, outwards, reach)
-    lines = find_clamp(
-        grey, curve, expected=state.first - (0.25 * width if turn == 0 else 0.0),
-        width=width, blur=state.blur, contrast=edges.contrast,
-        reach=1.3 * width if turn == 0 else 0.3 * width + 3.0, sign=sign,
-    )  # fmt: skip
-    line = lines.face or lines.front
-    if line is None:
-        raise LostError("no_clamp", "it is not seen where the rod leaves the clamp")
-    if lines.front is not None and is_face(lines.front.s - line.s, state.face_px):
-        line = lines.front  # what has edges between them is no rod
-    return tip, lines, line.s
-
-
-def is_face(apart: float, face_px: float) -> bool:
-    """Whether what lies between the two lines at a clamp is its face, seen obliquely.
-
-    It may be as dark as the rod, which then seems to end at the face's top edge.
-    """
-    return APART_PX < apart < APART_PX + face_px
-
-
-def _other_end(
-    grey: Image, state: _State, sign: float, outwards: float, reach: float
-) -> float:
-    curve = state.curve
-    back = Curve(
-        s=-curve.s[::-1], points=curve.points[::-1], theta=curve.theta[::-1] + np.pi,
-        kappa=-curve.kappa[::-1],
-    )  # fmt: skip
-    end = find_tip(
-        grey, back, expected=outwards - state.first, width=state.width,
-        blur=state.blur, reach=reach, sign=sign,
-    )  # fmt: skip
-    if end is None:
-        raise LostError("no_tip", "an end of the rod has no edge")
-    return -end.s
-
-
-def _border_crossing(grey: Image, curve: Curve) -> float:
-    """Return the arc length at which the axis enters the picture."""
-    s = np.arange(-80.0, min(80.0, curve.s[-1]), 0.25)
-    points, _ = curve.at(s)
-    height, width = grey.shape
-    inside = (
-        (points[:, 0] >= 0.0) & (points[:, 0] <= width - 1.0)
-        & (points[:, 1] >= 0.0) & (points[:, 1] <= height - 1.0)
-    )  # fmt: skip
-    outside = np.flatnonzero(~inside)
-    return (
-        float(s[outside[-1] + 1]) if outside.size and outside[-1] + 1 < len(s) else 0.0
-    )
-
-
-def _to_wall_ends(
-    state: _State, seen: _Seen, first: float, walls: Walls, *, clamped: bool
-) -> _Seen:
-    """Move edges from half level to where the side walls end, which are lighter."""
-    places = np.linspace(seen.s[0], seen.s[-1], WALL_PLACES)
-    wall = walls(*state.curve.at(places), state.width)
-    light = np.full(WALL_PLACES, WALL_LIGHT)
-    if clamped:
-        light *= 1.0 - np.exp(-np.maximum(places - first, 0.0) / state.width)
-    gap, window = level_span(state.blur, state.fuzz)
-    short = np.interp(
-        seen.s, places, _short_of_end(np.abs(wall), light, state.blur, gap, window)
-    )
-    left = np.interp(seen.s, places, wall) > 0.0
-    edges = seen.edges
-    return replace(
-        seen,
-        edges=replace(
-            edges,
-            low=edges.low - np.where(left, short, 0.0),
-            high=edges.high + np.where(left, 0.0, short),
-        ),
-    )
-
-
-@njit(cache=True)
-def _short_of_end(
-    wall: Array, light: Array, blur: float, gap: float, window: float
-) -> Array:
-    """Return how far half level lies within a wall of some width and light, px.
-
-    Of two blurred steps, one at the wall's end and one `wall` before it:
-    (1 - light) Phi(-x / blur) + light Phi((wall - x) / blur) = (1 + light part) / 2,
-    by Newton's method. A `part` of the `window` in which the rod's level is taken,
-    `gap` clear of the edge, lies on a wide wall.
-    """
-    short = np.zeros_like(wall)
-    for i in range(wall.size):
-        x = 0.0
-        part = min(max((wall[i] - gap) / window, 0.0), 1.0)
-        for _ in range(4):
-            a, b = (wall[i] - x) / blur, -x / blur
-            excess = light[i] * math.erf(a / math.sqrt(2.0))
-            excess += (1.0 - light[i]) * math.erf(b / math.sqrt(2.0))
-            excess -= light[i] * part
-            slope = light[i] * math.exp(-0.5 * a * a)
-            slope += (1.0 - light[i]) * math.exp(-0.5 * b * b)
-            x += blur * math.sqrt(0.5 * math.pi) * excess / slope
-        short[i] = x
-    return short
-
-
 def _fit(
-    state: _State, seen: _Seen, first: float, last: float,
+    state: State, seen: Seen, first: float, last: float,
     joints: Callable[[Curve], Sequence[float]], turn: int, *, clamped: bool,
 ) -> tuple[CurveFit, NDArray[np.bool_]]:  # fmt: skip
     width = state.width
@@ -451,7 +274,7 @@ def _held_ends(weights: Array, s: Array, width: float) -> Array:
     return held
 
 
-def _smooth_width(seen: _Seen, at: Array, typical: float) -> tuple[Array, Array]:
+def _smooth_width(seen: Seen, at: Array, typical: float) -> tuple[Array, Array]:
     """Return the width as a running mean over one rod width, and its deviation."""
     s, good, width = seen.s, seen.good, seen.edges.width
     half = max(2, int(0.5 * typical / s[1]))
@@ -463,14 +286,3 @@ def _smooth_width(seen: _Seen, at: Array, typical: float) -> tuple[Array, Array]
     scatter = 1.4826 * median(np.abs(width - mean)[good])
     sigma = scatter * np.sqrt(2.0 / np.maximum(count, 1.0))
     return np.interp(at, s, mean), np.interp(at, s, sigma)
-
-
-def _shifted(lines: ClampLines, first: float) -> ClampLines:
-    return ClampLines(
-        face=None
-        if lines.face is None
-        else replace(lines.face, s=lines.face.s - first),
-        front=None
-        if lines.front is None
-        else replace(lines.front, s=lines.front.s - first),
-    )

@@ -19,10 +19,12 @@ from numpy.typing import NDArray
 
 from .calibration import Calibration
 from .curve import Curve
+from .ends import APART_PX, is_face
 from .measurement import Measurement, Pose
-from .refine import APART_PX, LostError, Refined, is_face
+from .refine import Refined
 from .robust import median
 from .rod import Candidate
+from .state import LostError
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from magbend.core.centreline import Centreline
-from magbend.vision import as_photo, extract, refine, scene
+from magbend.vision import as_photo, extract, scene, wall_light
 from magbend.vision.measurement import Pose
-from magbend.vision.refine import _short_of_end
+from magbend.vision.wall_light import short_of_end
 
 S = np.linspace(0.0, 30.0, 301)
 ZERO = np.zeros_like(S)
@@ -26,7 +26,7 @@ def phi(z):
 @pytest.mark.parametrize("wall", [0.3, 1.0, 2.2, 4.0])
 def test_half_level_of_two_steps(wall):
     gap, window, blur, light = 2.0, 4.0, 0.9, 0.17
-    (x,) = _short_of_end(np.array([wall]), np.array([light]), blur, gap, window)
+    (x,) = short_of_end(np.array([wall]), np.array([light]), blur, gap, window)
     level = (1.0 - light) * phi(-x / blur) + light * phi((wall - x) / blur)
     part = min(max((wall - gap) / window, 0.0), 1.0)
     assert level == pytest.approx(0.5 * (1.0 + light * part), abs=1e-12)
@@ -35,7 +35,7 @@ def test_half_level_of_two_steps(wall):
 
 def test_no_wall_and_a_wall_wider_than_where_the_rods_level_is_taken():
     walls = np.array([0.0, 40.0])
-    short = _short_of_end(walls, np.full(2, 0.17), 0.9, 2.0, 4.0)
+    short = short_of_end(walls, np.full(2, 0.17), 0.9, 2.0, 4.0)
     assert short == pytest.approx(0.0, abs=1e-9)
 
 
@@ -63,7 +63,7 @@ def test_the_middle_is_the_axis_from_either_side(toward_deg):
 @pytest.mark.parametrize("toward_deg", [90.0, -90.0])
 def test_scenes_draw_walls_as_dark_as_the_top_where_they_are(monkeypatch, toward_deg):
     monkeypatch.setattr(scene, "SHEEN", 0.0)
-    monkeypatch.setattr(refine, "WALL_LIGHT", 0.0)
+    monkeypatch.setattr(wall_light, "WALL_LIGHT", 0.0)
     error, width = measured(toward_deg)
     assert abs(error) < 0.02
     assert width == pytest.approx(1.0, abs=0.003)
