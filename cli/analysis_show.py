@@ -1,0 +1,87 @@
+"""What ``magbend analysis compare`` and ``fit`` print."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from ..analysis.fit import FitResult
+
+
+def print_comparison(table: pd.DataFrame) -> None:
+    """Print a row for each step."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    shown = (
+        ("run", "run", None), ("step", "step", "d"), ("gap mm", "gap_mm", ".1f"),
+        ("flux mT", "flux_mT", ".2f"), ("model", "model", None),
+        ("RMS mm", "rms_mm", ".3f"), ("max mm", "max_mm", ".3f"),
+        ("tip mm", "tip_mm", ".3f"), ("tip %", "tip_percent", ".2f"),
+        ("angle deg", "tip_angle_deg", ".2f"), ("R meas", "radius_measured_mm", ".1f"),
+        ("R sim", "radius_simulated_mm", ".1f"), ("status", "status", None),
+    )  # fmt: skip
+    view = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for title, _, form in shown:
+        view.add_column(title, justify="right" if form else "left", overflow="fold")
+    for row in table.to_dict("records"):
+        view.add_row(*(_cell(row[name], form) for _, name, form in shown))
+    console = Console()
+    if not console.is_terminal:
+        # A pipe has no width of its own: every row stays on one line.
+        console = Console(width=240)
+    console.print(view)
+
+
+def _cell(value: Any, form: str | None) -> str:
+    if form is None:
+        return str(value)
+    return "-" if isinstance(value, float) and math.isnan(value) else f"{value:{form}}"
+
+
+def print_fit(result: FitResult, path: Path, posterior: dict[str, Any] | None) -> None:
+    """Print what was fitted, how sure it is, and where it was written."""
+    typer.echo(
+        f"{result.specimen.name}: {result.steps} steps, {result.model} field, "
+        f"reduced chi2 {result.chi2_reduced:.2f}, "
+        f"condition number {result.condition_number:.3g}"
+    )
+    for name, value, sd in zip(
+        result.parameters, result.values, result.sd, strict=True
+    ):
+        if name in result.not_identifiable:
+            typer.echo(f"  {name:20} not identifiable")
+        else:
+            typer.echo(
+                f"  {name:20} {value:.4g} +- {sd:.2g} ({100 * sd / value:.1f} %)"
+            )
+    for k, name in enumerate(result.parameters):
+        for m in range(k):
+            value = result.correlation[k, m]
+            if abs(value) > 0.5:
+                typer.echo(
+                    f"  correlation of {result.parameters[m]}, {name}: {value:.2f}"
+                )
+    for sentence in result.directions:
+        typer.echo(f"not identifiable: {sentence}")
+    for name, (value, sd) in result.ratios.items():
+        typer.echo(f"  {name} = {value:.4g} +- {sd:.2g} is what the data tell")
+    for sentence in result.skipped:
+        typer.echo(f"left out: {sentence}", err=True)
+    if posterior:
+        for name, low, middle, high in zip(
+            posterior["parameters"],
+            *(posterior[key] for key in ("q2_5", "median", "q97_5")),
+            strict=True,
+        ):
+            typer.echo(
+                f"  posterior {name}: {middle:.4g} (95 %: {low:.4g} to {high:.4g})"
+            )
+    typer.echo(str(path))
