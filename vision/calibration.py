@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ..core.errors import ConfigError, InputError, VisionError
 from .measurement import Pose
+from .projection import Camera, points_to_picture, points_to_plane
 
 Array = NDArray[np.float64]
 
@@ -104,6 +105,15 @@ class Calibration:
             )
 
     @property
+    def camera(self) -> Camera:
+        """The numbers that kernels take."""
+        return Camera(
+            np.array([*self.focal_px, *self.centre_px, *self.distortion], np.float64),
+            np.array(self.rotation, order="C"),
+            np.array(self.translation_mm),
+        )
+
+    @property
     def camera_mm(self) -> Array:
         """Position of the camera in the board frame, shape (3,), in mm."""
         return np.asarray(-self.rotation.T @ self.translation_mm)
@@ -133,15 +143,8 @@ class Calibration:
         ndarray, shape (n, 2)
             Board frame, in mm; NaN where the ray does not meet the plane.
         """
-        points = np.asarray(points_px, dtype=np.float64).reshape(-1, 2)
-        normalised = (points - self.centre_px) / self.focal_px
-        undistorted = undistort(normalised, self.distortion)
-        rays = np.column_stack([undistorted, np.ones(len(undistorted))]) @ self.rotation
-        camera = self.camera_mm
-        with np.errstate(divide="ignore", invalid="ignore"):
-            reach = (height_mm - camera[2]) / rays[:, 2]
-            reach[~(reach > 0.0)] = np.nan
-            return np.asarray(camera[:2] + reach[:, None] * rays[:, :2])
+        points = np.array(points_px, dtype=np.float64, order="C").reshape(-1, 2)
+        return np.asarray(points_to_plane(self.camera, points, float(height_mm)))
 
     def to_px(self, points_mm: Array, *, height_mm: float = 0.0) -> Array:
         """Return the pixels of points `height_mm` above the board: undo `to_mm`.
@@ -158,13 +161,8 @@ class Calibration:
         ndarray, shape (n, 2)
             In pixels.
         """
-        points = np.asarray(points_mm, dtype=np.float64).reshape(-1, 2)
-        space = np.column_stack([points, np.full(len(points), float(height_mm))])
-        camera = space @ self.rotation.T + self.translation_mm
-        normalised = camera[:, :2] / camera[:, 2:]
-        return np.asarray(
-            distort(normalised, self.distortion) * self.focal_px + self.centre_px
-        )
+        points = np.array(points_mm, dtype=np.float64, order="C").reshape(-1, 2)
+        return np.asarray(points_to_picture(self.camera, points, float(height_mm)))
 
     def mm_per_px(self, point_px: tuple[float, float], *, height_mm: float) -> float:
         """Return the local scale at a pixel: the root of the area of a pixel, mm."""
@@ -284,30 +282,3 @@ def specimen_to_px(calibration: Calibration, pose: Pose, xy_mm: Array) -> Array:
         In pixels.
     """
     return calibration.to_px(pose.to_board(xy_mm), height_mm=pose.height_mm)
-
-
-def distort(points: Array, coefficients: tuple[float, ...]) -> Array:
-    """Return distorted normalised points, shape (n, 2) (Brown 1966, as in OpenCV)."""
-    k1, k2, p1, p2, k3 = coefficients
-    x, y = points[:, 0], points[:, 1]
-    r2 = x * x + y * y
-    radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
-    return np.column_stack(
-        [
-            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-        ]
-    )
-
-
-def undistort(points: Array, coefficients: tuple[float, ...]) -> Array:
-    """Return the points that `distort` would move to `points`, by fixed-point steps."""
-    if not any(coefficients):
-        return points
-    guess = points.copy()
-    for _ in range(200):
-        step = points - distort(guess, coefficients)
-        guess = guess + step
-        if np.abs(step).max(initial=0.0) < 1e-13:
-            break
-    return guess

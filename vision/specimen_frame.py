@@ -21,6 +21,7 @@ from .calibration import Calibration
 from .curve import Curve
 from .ends import APART_PX, is_face
 from .measurement import Measurement, Pose
+from .projection import LocalView, local_view
 from .refine import Refined
 from .robust import median
 from .rod import Candidate
@@ -85,35 +86,17 @@ class Setting:
         """
         if self.calibration is None:
             return np.zeros(len(points))
-        local = _local(self.calibration, points, theta, self.rod_height_mm)
-        return local.rise_across * width_px / local.silhouette
+        view = _view(self.calibration, points, theta, self)
+        return view.rise_across * width_px / _silhouette(view)
 
     def face_px(self, curve: Curve) -> float:
         """Return how much of a clamp's face may be seen at the root of a curve."""
         if self.calibration is None:
             return 0.0
         ends = curve.points[:1], curve.theta[:1]
-        rise = _local(self.calibration, *ends, self.rod_height_mm).rise_along[0]
+        rise = _view(self.calibration, *ends, self).rise_along[0]
         height = self.clamp_height_mm or self.rod_height_mm + UNKNOWN_CLAMP_MM
         return max(0.0, -float(rise) * height)
-
-
-@dataclass(frozen=True, slots=True)
-class _Local:
-    """The camera at points of the rod, shape (n,) each.
-
-    Pixels per mm along and across the rod, and the shift either way per mm of height.
-    """
-
-    along: Array
-    across: Array
-    rise_along: Array
-    rise_across: Array
-
-    @property
-    def silhouette(self) -> Array:
-        """Pixels between the edges of a rod per mm of its side."""
-        return self.across + np.abs(self.rise_across)
 
 
 def measurement(
@@ -170,63 +153,54 @@ def _pixel_columns(
 
 def _calibrated(refined: Refined, setting: Setting, camera: Calibration) -> Measurement:
     curve = refined.fit.curve
-    height = setting.rod_height_mm
-    ends = _local(camera, curve.points[[0, -1]], curve.theta[[0, -1]], height)
-    side_mm = refined.typical_width / float(ends.silhouette.mean())
+    ends = _view(camera, curve.points[[0, -1]], curve.theta[[0, -1]], setting)
+    side_mm = refined.typical_width / float(_silhouette(ends).mean())
     last = refined.tip.s - 0.5 * side_mm * abs(float(ends.rise_along[1]))
     first = _root(refined, ends, setting, side_mm)
     s = np.linspace(first, last, 4 * POINTS)
-    points, theta = curve.at(s)
-    xy = camera.to_mm(points, height_mm=height)
-    if not np.all(np.isfinite(xy)):
+    points, _ = curve.at(s)
+    s_mm = _arc(camera.to_mm(points, height_mm=setting.rod_height_mm))
+    if not np.isfinite(s_mm[-1]):
         raise LostError(
             "calibration_mismatch",
             "the calibration sees no plane where the rod is; calibrate again",
         )
-    return _in_frame(refined, setting, s, points, theta, xy, camera)
+    even = np.linspace(0.0, s_mm[-1], POINTS)
+    return _in_frame(refined, setting, even, np.interp(even, s_mm, s), camera)
 
 
 def _in_frame(
-    refined: Refined, setting: Setting, s: Array, points: Array, theta: Array,
-    xy: Array, camera: Calibration,
-) -> Measurement:  # fmt: skip
-    height = setting.rod_height_mm
-    tangent = 0.5 * np.column_stack([np.cos(theta), np.sin(theta)])
-    around = np.concatenate([points + tangent, points - tangent])
-    ahead, behind = np.split(camera.to_mm(around, height_mm=height), 2)
-    step = ahead - behind
-    stretch = np.hypot(step[:, 0], step[:, 1])
-    heading = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
-    s_mm = _arc(xy)
+    refined: Refined, setting: Setting, s_mm: Array, s: Array, camera: Calibration
+) -> Measurement:
+    """Return the measurement at these arc lengths, in mm and px."""
+    fit = refined.fit
+    grid = fit.curve
+    points, theta = grid.at(s)
+    view = _view(camera, points, theta, setting)
+    heading = np.unwrap(view.heading)
     pose = Pose(
-        x_mm=float(xy[0, 0]), y_mm=float(xy[0, 1]),
-        angle_deg=float(np.degrees(heading[0])), height_mm=height,
+        x_mm=float(view.x_mm[0]), y_mm=float(view.y_mm[0]),
+        angle_deg=float(np.degrees(heading[0])), height_mm=setting.rod_height_mm,
     )  # fmt: skip
-    own = pose.from_board(xy)
-    grid = refined.fit.curve
-    kappa_px = np.interp(s, grid.s, grid.kappa)
+    own = pose.from_board(np.column_stack([view.x_mm, view.y_mm]))
     # y runs down in the picture: there the heading turns the other way.
-    kappa = (np.gradient(heading + theta, s) - kappa_px) / stretch
-    even = np.linspace(0.0, s_mm[-1], POINTS)
-    s_px = np.interp(even, s_mm, s)
-    pixel, angle = grid.at(s_px)
-    table = _pixel_columns(refined, s_px, pixel, angle)
-    scale = np.interp(even, s_mm, stretch)
-    local = _local(camera, pixel, angle, height)
-    across = local.silhouette
-    wall = np.abs(local.rise_across) * table["width_px"] / across
+    kappa_px = np.gradient(heading + theta, s) - np.interp(s, grid.s, grid.kappa)
+    table = _pixel_columns(refined, s, points, theta)
+    across = _silhouette(view)
+    wall = np.abs(view.rise_across) * table["width_px"] / across
     table["sigma_px"] = np.hypot(table["sigma_px"], SIDE_FACE * wall)
     table |= {
-        "s_mm": even,
-        "x_mm": np.interp(even, s_mm, own[:, 0]),
-        "y_mm": np.interp(even, s_mm, own[:, 1]),
-        "theta_rad": np.interp(even, s_mm, heading - heading[0]),
-        "kappa_per_mm": np.interp(even, s_mm, kappa),
+        "s_mm": s_mm,
+        "x_mm": own[:, 0],
+        "y_mm": own[:, 1],
+        "theta_rad": heading - heading[0],
+        "kappa_per_mm": kappa_px * view.along,
         "width_mm": table["width_px"] / across,
-        "sigma_mm": table["sigma_px"] * scale,
-        "sigma_kappa_per_mm": np.interp(s_px, grid.s, refined.fit.sigma_kappa) / scale,
-        "sigma_width_mm": np.interp(s_px, grid.s, refined.sigma_width) / across,
+        "sigma_mm": table["sigma_px"] / view.along,
+        "sigma_kappa_per_mm": np.interp(s, grid.s, fit.sigma_kappa) * view.along,
+        "sigma_width_mm": np.interp(s, grid.s, refined.sigma_width) / across,
     }
+    hidden = _hidden_px(refined, setting, float(view.rise_along[0]))
     return Measurement(
         status="ok",
         points=table,
@@ -234,11 +208,7 @@ def _in_frame(
         tip_mm=(float(own[-1, 0]), float(own[-1, 1])),
         tip_angle_deg=float(np.degrees(heading[-1] - heading[0])),
         width_mm=median(table["width_mm"][table["good"] > 0.5]),
-        clamp_angle_sd_deg=_clamp_sd_deg(
-            refined,
-            np.interp(grid.s, s_px, wall),
-            _hidden_px(refined, setting, float(local.rise_along[0])),
-        ),
+        clamp_angle_sd_deg=_clamp_sd_deg(refined, np.interp(grid.s, s, wall), hidden),
         length_px=float(s[-1] - s[0]),
         width_px=refined.typical_width,
         clamp_px=(float(points[0, 0]), float(points[0, 1])),
@@ -263,7 +233,7 @@ def _clamp_sd_deg(refined: Refined, wall: Array, hidden: float) -> float:
     return math.degrees(math.hypot(*parts))
 
 
-def _root(refined: Refined, ends: _Local, setting: Setting, side_mm: float) -> float:
+def _root(refined: Refined, ends: LocalView, setting: Setting, side_mm: float) -> float:
     """Return the arc length in px at which the axis leaves the clamp.
 
     The clamp's front plane is seen at the top of the rod (its face) and at the paper
@@ -286,7 +256,7 @@ def _root(refined: Refined, ends: _Local, setting: Setting, side_mm: float) -> f
     return float(np.mean(seen_at)) if seen_at else 0.0
 
 
-def _hidden_root(refined: Refined, ends: _Local, setting: Setting) -> float:
+def _hidden_root(refined: Refined, ends: LocalView, setting: Setting) -> float:
     """Return the root where the clamp's top edge hides it: by height, or by length."""
     lines = refined.clamp
     line = None if lines is None else lines.face or lines.front
@@ -309,7 +279,7 @@ def root_hidden(refined: Refined, setting: Setting) -> bool:
     if setting.calibration is None:
         return False
     ends = refined.fit.curve.points[:1], refined.fit.curve.theta[:1]
-    at = _local(setting.calibration, *ends, setting.rod_height_mm)
+    at = _view(setting.calibration, *ends, setting)
     hidden = _hidden_px(refined, setting, float(at.rise_along[0]))
     return hidden > HIDDEN_MM * float(at.along[0])
 
@@ -320,17 +290,17 @@ def _hidden_px(refined: Refined, setting: Setting, rise: float) -> float:
     return 0.0 if known or refined.clamp is None else max(0.0, rise) * UNKNOWN_CLAMP_MM
 
 
-def _local(camera: Calibration, points: Array, theta: Array, height: float) -> _Local:
-    t = np.column_stack([np.cos(theta), np.sin(theta)])
-    n = np.column_stack([-t[:, 1], t[:, 0]])
-    around = np.concatenate([points - t, points + t, points - n, points + n, points])
-    mm = camera.to_mm(around, height_mm=height).reshape(5, -1, 2)
-    rise = camera.to_px(mm[4], height_mm=height + 0.5)
-    rise -= camera.to_px(mm[4], height_mm=height - 0.5)
-    return _Local(
-        2.0 / np.hypot(*(mm[1] - mm[0]).T), 2.0 / np.hypot(*(mm[3] - mm[2]).T),
-        np.sum(rise * t, axis=1), np.sum(rise * n, axis=1),
-    )  # fmt: skip
+def _view(
+    camera: Calibration, points: Array, theta: Array, setting: Setting
+) -> LocalView:
+    height = float(setting.rod_height_mm)
+    view: LocalView = local_view(camera.camera, points, theta, height)
+    return view
+
+
+def _silhouette(view: LocalView) -> Array:
+    """Return the pixels between the edges of a rod per mm of its side."""
+    return view.across + np.abs(view.rise_across)
 
 
 def _arc(points: Array) -> Array:
