@@ -18,16 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.jit import njit
-from .robust import median, row_quantiles
+from .robust import median
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 
 STEP_PX = 0.5
 """Distance of samples along a profile."""
-
-EDGE_LEVEL, SHADED_LEVEL = 0.27, 0.4
-"""Where a rough edge is, from rod to paper, and from rod to shade right beside it."""
 
 _SHADE = 0.003
 """Slope of the paper beside a rod, per px and contrast, that is no shade yet."""
@@ -165,70 +162,6 @@ def find_edges(
         inner=0.5 * (out[0, 2] + out[1, 2]), outer_low=out[0, 3], outer_high=out[1, 3],
         shade_low=out[0, 4], shade_high=out[1, 4],
     )  # fmt: skip
-
-
-def rough_edges(
-    grey: Image, points: Array, normals: Array, *, reach: float, sign: float = 1.0
-) -> tuple[Array, Array, float, float]:  # fmt: skip
-    """Return where the dark of a rod ends on either side, to about a pixel.
-
-    The level is a quarter of the way from rod to paper, or lower where deep shade lies
-    beside the rod, and is looked for from outside, so that a streak of glare on the rod
-    does no harm.
-
-    Parameters
-    ----------
-    grey : ndarray, shape (height, width), float32
-        Linear light.
-    points, normals : ndarray, shape (n, 2)
-        Stations inside the rod and unit normals.
-    reach : float
-        Largest offset, px: the half width with whatever shadow was taken for rod.
-    sign : float
-        -1 for a light rod.
-
-    Returns
-    -------
-    low, high : ndarray, shape (n,)
-        Offsets of the edges; NaN where the profile is nowhere dark.
-    dark, level : float
-        Light of the rod, and the level taken, the lower one of both sides.
-    """
-    count = int(np.ceil((reach + 2.0) / STEP_PX))
-    strip = np.empty((len(points), 2 * count), dtype=np.float32)
-    axis = np.zeros(len(points))
-    _sample(grey, points, normals, axis, 1.0, count, np.float32(sign), strip)
-    # Of the whole profile: where the curve runs along the edge of a deep shadow, the
-    # profile's middle is half shadow.
-    dark = median(row_quantiles(strip[::8], 0.2))
-    paper = median(np.fmax.reduce(strip, axis=1))
-    level = dark + EDGE_LEVEL * (paper - dark)
-    # Again under the shade that lies beside the dark, which may be far from white.
-    low, high = _dark_within(strip, count, level)
-    left = min(level, dark + SHADED_LEVEL * (_light_at(strip, count, low - 4.0) - dark))
-    right = min(
-        level, dark + SHADED_LEVEL * (_light_at(strip, count, high + 4.0) - dark)
-    )
-    low, _ = _dark_within(strip, count, left)
-    _, high = _dark_within(strip, count, right)
-    return low, high, dark, min(left, right)
-
-
-def _light_at(strip: Image, count: int, place: Array) -> float:
-    """Return the median light of the profiles at one place of each."""
-    known = np.flatnonzero(np.isfinite(place))
-    column = np.clip(place[known] / STEP_PX + count, 0, strip.shape[1] - 1).astype(int)
-    return median(strip[known, column])
-
-
-def _dark_within(strip: Image, count: int, level: float) -> tuple[Array, Array]:
-    """Return the outermost places of each profile where it is darker than a level."""
-    inside = strip < level
-    offsets = (np.arange(2 * count) - count + 0.5) * STEP_PX
-    some = inside.any(axis=1)
-    low = np.where(some, offsets[np.argmax(inside, axis=1)], np.nan)
-    high = np.where(some, offsets[::-1][np.argmax(inside[:, ::-1], axis=1)], np.nan)
-    return low - 0.5 * STEP_PX, high + 0.5 * STEP_PX
 
 
 def level_span(blur: float, fuzz: float) -> tuple[float, float]:

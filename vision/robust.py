@@ -19,15 +19,6 @@ def quantile(values: NDArray[np.floating], part: float) -> float:
 
 
 @njit(cache=True)
-def row_quantiles(values: NDArray[np.floating], part: float) -> NDArray[np.float64]:
-    """Return the quantile of each row of an array, NaN for a row with a NaN."""
-    found = np.empty(len(values))
-    for i in range(len(values)):
-        found[i] = np.quantile(values[i], part)
-    return found
-
-
-@njit(cache=True)
 def _median(values: NDArray[np.floating]) -> float:
     return float(np.nanmedian(values))
 

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from ..core.jit import njit
 from .centreline_fit import SHARED, fit_curve
 from .curve import Curve
-from .edges import SHADED_LEVEL, STEP_PX, _bilinear, rough_edges
+from .edges import STEP_PX, _bilinear
 from .robust import median
+from .rough_edges import SHADED_LEVEL, rough_edges
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -98,17 +99,30 @@ def smooth_curve(points: Array, *, spacing: float) -> Curve:
     return fit.curve
 
 
+@njit(cache=True)
 def _resample(points: Array, window: float) -> tuple[Array, Array, Array]:
     """Return arc length, points and smoothed tangent angles on an even grid."""
-    steps = np.hypot(*np.diff(points, axis=0).T)
-    points = points[np.concatenate([[True], steps > 1e-6])]
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    s = np.linspace(0.0, along[-1], max(int(along[-1] / _GRID_PX), 100) + 1)
-    even = np.column_stack([np.interp(s, along, points[:, k]) for k in (0, 1)])
-    index, reach = np.arange(len(s)), max(1, round(window / s[1]))
-    chord = even[np.minimum(index + reach, len(s) - 1)]
-    chord = chord - even[np.maximum(index - reach, 0)]
-    return s, even, np.unwrap(np.arctan2(chord[:, 1], chord[:, 0]))
+    kept, along = points.copy(), np.zeros(len(points))
+    last = 0
+    for i in range(1, len(points)):
+        step = np.hypot(points[i, 0] - kept[last, 0], points[i, 1] - kept[last, 1])
+        if step > 1e-6:
+            last += 1
+            kept[last], along[last] = points[i], along[last - 1] + step
+    along = along[: last + 1]
+    s = np.linspace(0.0, along[last], max(int(along[last] / _GRID_PX), 100) + 1)
+    even = np.empty((s.size, 2))
+    for k in range(2):
+        even[:, k] = np.interp(s, along, kept[: last + 1, k])
+    reach = max(1, round(window / s[1]))
+    theta = np.empty(s.size)
+    for i in range(s.size):
+        chord = even[min(i + reach, s.size - 1)] - even[max(i - reach, 0)]
+        theta[i] = np.arctan2(chord[1], chord[0])
+        if i > 0:
+            turns = round((theta[i] - theta[i - 1]) / (2.0 * np.pi))
+            theta[i] -= 2.0 * np.pi * turns
+    return s, even, theta
 
 
 def _follow(

@@ -5,7 +5,8 @@ import pytest
 from scipy.special import erf
 
 from magbend.vision.binarise import binarise
-from magbend.vision.edges import _bilinear, find_edges, rough_edges
+from magbend.vision.edges import _bilinear, find_edges
+from magbend.vision.rough_edges import rough_edges
 
 
 def bar(
