@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..core.jit import njit
 from .binarise import Binary
+from .level_sets import level_sets
 from .robust import median
 
 Array = NDArray[np.float64]
@@ -29,14 +30,11 @@ LEAST_SLENDERNESS = 6.0
 LEAST_SHARE = 0.2
 """Shortest rod beside another long thin thing, over the length of that."""
 
-_HALVED = 8
-"""Bins of log width from one width to half of it."""
+_BIN, _HALVED = 0.09, 8
+"""Width of a bin of log width, and bins from one width to half of it."""
 
 _GRAIN = 1.5
 """Half width under which a thing may be noise."""
-
-_PAD = 40
-"""How far things are carried past the border of the picture."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,7 +125,7 @@ def _fill(
 def _thin_parts(roi: Mask, origin: tuple[int, int], binary: Binary) -> list[Candidate]:
     """Return the thin parts of a thing: of the commonest width, or grown from that."""
     depth = _edge_distance(roi, origin, binary)
-    ridge = _ridge(np.ascontiguousarray(depth))
+    ridge = _ridge(depth)
     common, thinner = _half_widths(ridge)
     found = _of_width(roi, depth, common, origin, binary) if common else []
     if not found and common < _GRAIN:
@@ -171,7 +169,7 @@ def _of_width(
         cv2.drawContours(piece, [part], 0, 1, cv2.FILLED, offset=(-x0, -y0))
         piece &= thin[window]
         place = (origin[0] - 1 + x0, origin[1] - 1 + y0)
-        candidate = _trace(piece, fat[window], depth[window], place, half, binary)
+        candidate = _trace(piece, fat[window], place, half, binary)
         if candidate is not None:
             found.append(candidate)
     return found
@@ -182,28 +180,14 @@ def _edge_distance(
 ) -> NDArray[np.float32]:
     """Return the distance to the paper; the border of the picture is no paper."""
     height, width = binary.mask.shape
-    x, y = origin
-    h, w = roi.shape[0] - 2, roi.shape[1] - 2
-    padded = roi.copy()
-    if x == 0:
-        padded[:, 0] = padded[:, 1]
-    if y == 0:
-        padded[0] = padded[1]
-    if x + w == width:
-        padded[:, -1] = padded[:, -2]
-    if y + h == height:
-        padded[-1] = padded[-2]
-    before_x, before_y = _PAD * (x == 0), _PAD * (y == 0)
-    after_x, after_y = _PAD * (x + w == width), _PAD * (y + h == height)
-    grown = cv2.copyMakeBorder(
-        padded, before_y, after_y, before_x, after_x, cv2.BORDER_REPLICATE
+    (x, y), (h, w) = origin, (roi.shape[0] - 2, roi.shape[1] - 2)
+    inside = (
+        slice(int(y == 0), h + 2 - int(y + h == height)),
+        slice(int(x == 0), w + 2 - int(x + w == width)),
     )
-    depth = np.asarray(cv2.distanceTransform(grown, cv2.DIST_L2, 5))
-    height, width = roi.shape
-    inside = depth[before_y : before_y + height, before_x : before_x + width]
-    inside[[0, -1]] = 0.0
-    inside[:, [0, -1]] = 0.0
-    return np.asarray(inside, dtype=np.float32)
+    depth = np.zeros(roi.shape, np.float32)
+    depth[inside] = cv2.distanceTransform(roi[inside], cv2.DIST_L2, 5)
+    return depth
 
 
 def _near(core: Mask, reach: float) -> Mask:
@@ -220,6 +204,7 @@ def _near(core: Mask, reach: float) -> Mask:
     return near
 
 
+@njit(cache=True)
 def _half_widths(ridge: NDArray[np.float32]) -> tuple[float, float]:
     """Return the half widths that long and thin parts of the medial axis share.
 
@@ -228,21 +213,22 @@ def _half_widths(ridge: NDArray[np.float32]) -> tuple[float, float]:
     """
     if ridge.size < 8:
         return 0.0, 0.0
-    bins = np.floor(np.log(ridge) / 0.09).astype(int)
-    lowest = int(bins.min())
+    bins = np.floor(np.log(ridge) / _BIN).astype(np.int64)
+    lowest = bins.min()
     bins -= lowest
-    near = np.convolve(np.bincount(bins), [1, 1, 1, 1, 1], mode="same")
-    width = np.exp(0.09 * (lowest + np.arange(len(near))))
-    score = near / np.sqrt(width)
-    best = int(np.argmax(score))
-    common = median(ridge[np.abs(bins - best) <= 2])
-    below = best - _HALVED
-    if below <= 0:
+    count = np.zeros(bins.max() + 1)
+    for k in bins:
+        count[max(k - 2, 0) : k + 3] += 1.0
+    width = np.exp(_BIN * (lowest + np.arange(count.size)))
+    score = count / np.sqrt(width)
+    best = np.argmax(score)
+    common = np.median(ridge[np.abs(bins - best) <= 2])
+    if best <= _HALVED:
         return common, 0.0
-    second = int(np.argmax(score[:below]))
-    if near[second] < 2.0 * LEAST_SLENDERNESS * width[second]:
+    second = np.argmax(score[: best - _HALVED])
+    if count[second] < 2.0 * LEAST_SLENDERNESS * width[second]:
         return common, 0.0
-    return common, median(ridge[np.abs(bins - second) <= 2])
+    return common, np.median(ridge[np.abs(bins - second) <= 2])
 
 
 @njit(cache=True)
@@ -275,23 +261,21 @@ def _ridge(depth: NDArray[np.float32]) -> NDArray[np.float32]:
 def _trace(
     piece: Mask,
     fat: Mask,
-    depth: NDArray[np.float32],
     place: tuple[int, int],
     half: float,
     binary: Binary,
 ) -> Candidate | None:
-    area = int(piece.sum())
-    if area < 4.0 * LEAST_SLENDERNESS * half * half:
+    if cv2.countNonZero(piece) < 4.0 * LEAST_SLENDERNESS * half * half:
         return None
-    touching, contacts = _contact(piece, _grown(fat))
-    at_border, border_contacts = _contact(piece, _border(piece.shape, place, binary))
+    touching, contacts = _contact(piece & _grown(fat))
+    at_border, border_contacts = _contact(piece & _border(piece.shape, place, binary))
     root: Root = "free"
     seeds = None
     if contacts:
         root, seeds = "clamp", touching
     elif border_contacts:
         root, seeds = "border", at_border
-    curve = _level_sets(piece, seeds, half)
+    curve = level_sets(piece, seeds, half)
     if curve is None:
         return None
     steps = np.hypot(*np.diff(curve, axis=0).T)
@@ -299,30 +283,31 @@ def _trace(
     width = max(2.0 * half, 1.0)
     if length < LEAST_SLENDERNESS * width:
         return None
-    ridge = piece.astype(bool) & (depth > 0.6 * half)
-    y, x = np.nonzero(ridge)
-    light = binary.ratio[
-        np.clip(y + place[1], 0, binary.ratio.shape[0] - 1),
-        np.clip(x + place[0], 0, binary.ratio.shape[1] - 1),
-    ]
+    x, y = np.rint(curve + place).astype(int).T
     f = binary.factor
     return Candidate(
-        points_px=(curve + np.array(place) + 0.5) * f - 0.5,
+        points_px=(curve + place + 0.5) * f - 0.5,
         width_px=width * f,
         length_px=length * f,
         root=root,
         contacts=contacts + border_contacts,
-        ratio=median(light) if light.size else 1.0,
+        ratio=median(binary.ratio[y, x]),
     )
 
 
-def _contact(piece: Mask, other: Mask) -> tuple[Mask, int]:
+def _contact(both: Mask) -> tuple[Mask, int]:
     """Return the pixels of one place where two masks meet, and how many there are."""
-    both = piece & other
-    if not both.any():
+    x, y, w, h = cv2.boundingRect(both)
+    if w == 0:
         return both, 0
-    places, labels = cv2.connectedComponents(_grown(both))
-    return both & (labels == 1), places - 1
+    # Far fewer pixels than the whole, and a frame for them to grow into.
+    small = cv2.copyMakeBorder(
+        both[y : y + h, x : x + w], 2, 2, 2, 2, cv2.BORDER_CONSTANT
+    )
+    count, labels = cv2.connectedComponents(_grown(small))
+    first = np.zeros_like(both)
+    first[y : y + h, x : x + w] = both[y : y + h, x : x + w] & (labels[2:-2, 2:-2] == 1)
+    return first, count - 1
 
 
 def _grown(mask: Mask) -> Mask:
@@ -333,92 +318,10 @@ def _grown(mask: Mask) -> Mask:
 def _border(shape: tuple[int, ...], place: tuple[int, int], binary: Binary) -> Mask:
     """Mark the outermost pixels of the picture inside a window."""
     height, width = binary.mask.shape
+    x, y = place
     inside = np.zeros(shape, np.uint8)
-    rows = np.arange(shape[0]) + place[1]
-    columns = np.arange(shape[1]) + place[0]
-    inside[(rows <= 0) | (rows >= height - 1)] = 1
-    inside[:, (columns <= 0) | (columns >= width - 1)] = 1
+    inside[: max(1 - y, 0)] = 1
+    inside[max(height - 1 - y, 0) :] = 1
+    inside[:, : max(1 - x, 0)] = 1
+    inside[:, max(width - 1 - x, 0) :] = 1
     return inside
-
-
-def _level_sets(piece: Mask, seeds: Mask | None, half: float) -> Array | None:
-    """Return the centres of the geodesic level sets, shape (n, 2), root to tip."""
-    smooth = piece
-    if half >= 3.0:
-        size = 2 * int(0.35 * half) + 1
-        kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
-        smooth = np.asarray(cv2.morphologyEx(piece, cv2.MORPH_OPEN, kernel), np.uint8)
-        if seeds is not None:
-            smooth = smooth | (piece & seeds)
-    smooth = np.ascontiguousarray(smooth, dtype=np.uint8)
-    if seeds is None:
-        first = np.argmax(smooth)
-        far = np.zeros_like(smooth)
-        far.flat[first] = 1
-        distance = _geodesic(smooth, far)
-        seeds = np.zeros_like(smooth)
-        seeds.flat[int(np.argmax(distance))] = 1
-    distance = _geodesic(smooth, np.ascontiguousarray(seeds & smooth))
-    step = max(1.0, half)
-    top = float(distance.max())
-    if top < 4.0 * step:
-        return None
-    sums = np.zeros((int(top / step) + 1, 3))
-    _sum_sets(distance, step, sums)
-    count = sums[:, 0]
-    if np.any(count == 0):
-        return None
-    curve = sums[:, 1:] / count[:, None]
-    return curve[:-1] if count[-1] < 0.5 * median(count) else curve
-
-
-@njit(cache=True)
-def _sum_sets(distance: NDArray[np.float32], step: float, sums: Array) -> None:
-    """Add up number, x and y of the pixels of each level set."""
-    height, width = distance.shape
-    for i in range(height):
-        for j in range(width):
-            if distance[i, j] >= 0.0:
-                k = int(distance[i, j] / step)
-                sums[k, 0] += 1.0
-                sums[k, 1] += j
-                sums[k, 2] += i
-
-
-@njit(cache=True)
-def _geodesic(mask: Mask, seeds: Mask) -> NDArray[np.float32]:
-    """Distance from the seeds inside the mask (8 neighbours); -1 where unreached."""
-    height, width = mask.shape
-    distance = np.full((height, width), -1.0, dtype=np.float32)
-    size = height * width + 1
-    queue = np.empty(size, dtype=np.int64)
-    waiting = np.zeros(height * width, dtype=np.uint8)
-    head, tail = 0, 0
-    for i in range(height):
-        for j in range(width):
-            if seeds[i, j] and mask[i, j]:
-                distance[i, j] = 0.0
-                queue[tail] = i * width + j
-                waiting[i * width + j] = 1
-                tail += 1
-    while head != tail:
-        place = queue[head]
-        head = (head + 1) % size
-        waiting[place] = 0
-        i, j = place // width, place % width
-        for di in range(-1, 2):
-            for dj in range(-1, 2):
-                k, m = i + di, j + dj
-                if k < 0 or m < 0 or k >= height or m >= width or mask[k, m] == 0:
-                    continue
-                step = 1.0 if di == 0 or dj == 0 else 1.41421356
-                new = distance[i, j] + np.float32(step)
-                old = distance[k, m]
-                if old < 0.0 or new < old - 1e-4:
-                    distance[k, m] = new
-                    spot = k * width + m
-                    if waiting[spot] == 0:
-                        waiting[spot] = 1
-                        queue[tail] = spot
-                        tail = (tail + 1) % size
-    return distance
