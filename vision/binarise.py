@@ -22,8 +22,12 @@ WORK_PX = 1000
 """The longer side of the working picture, roughly."""
 
 _SAMPLE = 1500
-_LEAST_DARK = 30
-"""Fewer dark pixels than this in the working picture are no rod."""
+_STRIDE = 8
+"""Every so many pixels along rows and columns tell how light a large picture is."""
+
+_LEAST_DARK, _NO_PAPER = 30, 0.7
+"""Fewer pixels darker than this share of the paper, in the working picture, are no
+rod."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +78,7 @@ def binarise(grey: NDArray[np.float32], *, invert: bool | None = None) -> Binary
         size = (grey.shape[1] // factor, grey.shape[0] // factor)
         whole = grey[: size[1] * factor, : size[0] * factor]
         work = np.asarray(cv2.resize(whole, size, interpolation=cv2.INTER_AREA))
-    sample = work[::5, ::5] if work.size > 100_000 else work
+    sample = work[::_STRIDE, ::_STRIDE] if work.size > 100_000 else work
     low, middle, high = _quantiles(sample, 0.003, 0.5, 0.997)
     if high - low < 0.02 or high < 1.3 * low:
         return None
@@ -83,8 +87,15 @@ def binarise(grey: NDArray[np.float32], *, invert: bool | None = None) -> Binary
     if invert:
         work = np.float32(max(high, float(sample.max()))) - work
     ratio = np.empty_like(work)
-    _divide(work, *_background(work), ratio)
-    return _threshold(ratio, factor, invert)
+    darker = _divide(work, *_background(work), ratio)
+    if darker.size < _LEAST_DARK // 4:
+        return None
+    (dark,) = _quantiles(darker, 0.1)
+    threshold = min(max(0.4 + 0.6 * dark, 0.35), 0.72)
+    return Binary(
+        ratio=ratio, mask=_mask(ratio, threshold), factor=factor, inverted=invert,
+        dark=dark, threshold=threshold,
+    )  # fmt: skip
 
 
 def rebinarise(binary: Binary, threshold: float) -> Binary:
@@ -95,23 +106,6 @@ def rebinarise(binary: Binary, threshold: float) -> Binary:
         factor=binary.factor,
         inverted=binary.inverted,
         dark=binary.dark,
-        threshold=threshold,
-    )
-
-
-def _threshold(ratio: NDArray[np.float32], factor: int, invert: bool) -> Binary | None:
-    sample = ratio[::2, ::2]
-    darker = sample[sample < 0.7]
-    if darker.size < _LEAST_DARK // 4:
-        return None
-    (dark,) = _quantiles(darker, 0.1)
-    threshold = min(max(0.4 + 0.6 * dark, 0.35), 0.72)
-    return Binary(
-        ratio=ratio,
-        mask=_mask(ratio, threshold),
-        factor=factor,
-        inverted=invert,
-        dark=dark,
         threshold=threshold,
     )
 
@@ -174,26 +168,26 @@ def _quantiles(values: NDArray[np.floating], *parts: float) -> list[float]:
     return [float(ordered[place]) for place in places]
 
 
+@njit(cache=True, error_model="numpy")
 def _divide(
     work: NDArray[np.float32], c: NDArray[np.float32], floor: np.float32,
     ratio: NDArray[np.float32],
-) -> None:  # fmt: skip
-    """Divide by the quadric, which is at least `floor`."""
+) -> NDArray[np.float32]:  # fmt: skip
+    """Divide by the quadric, which is at least `floor`; return each fourth dark one."""
     height, width = work.shape
-    x = np.linspace(-1.0, 1.0, width, dtype=np.float32)
-    y = np.linspace(-1.0, 1.0, height, dtype=np.float32)
-    _divide_rows(
-        work, x, c[0] + y * (c[2] + c[5] * y), c[1] + c[4] * y, c[3], floor, ratio
-    )
-
-
-@njit(cache=True, error_model="numpy")
-def _divide_rows(
-    work: NDArray[np.float32], x: NDArray[np.float32], level: NDArray[np.float32],
-    slope: NDArray[np.float32], bend: np.float32, floor: np.float32,
-    ratio: NDArray[np.float32],
-) -> None:  # fmt: skip
-    for i in range(level.size):
-        for j in range(x.size):
-            light = level[i] + x[j] * (slope[i] + bend * x[j])
-            ratio[i, j] = work[i, j] / (light if light > floor else floor)
+    x = np.linspace(-1.0, 1.0, width).astype(np.float32)
+    y = np.linspace(-1.0, 1.0, height).astype(np.float32)
+    darker = np.empty(((height + 1) // 2) * ((width + 1) // 2), np.float32)
+    count = 0
+    for i in range(height):
+        level, slope = c[0] + y[i] * (c[2] + c[5] * y[i]), c[1] + c[4] * y[i]
+        row = ratio[i]
+        for j in range(width):
+            light = level + x[j] * (slope + c[3] * x[j])
+            row[j] = work[i, j] / (light if light > floor else floor)
+        if i % 2 == 0:
+            for j in range(0, width, 2):
+                if row[j] < _NO_PAPER:
+                    darker[count] = row[j]
+                    count += 1
+    return darker[:count]

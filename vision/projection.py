@@ -44,7 +44,7 @@ class LocalView(NamedTuple):
     x_mm, y_mm : ndarray
         The points, in the board frame.
     heading : ndarray
-        Direction of the curve in the board frame, in rad from -pi to pi.
+        Direction of the curve in the board frame, in rad, unwrapped.
     along, across : ndarray
         Pixels per mm along and across the curve.
     rise_along, rise_across : ndarray
@@ -99,6 +99,9 @@ def local_view(camera: Camera, points: Array, theta: Array, height: float) -> Lo
         rise_x, rise_y = high[0] - low[0], high[1] - low[1]
         out[0, i], out[1, i] = at_x, at_y
         out[2, i] = np.arctan2(step_y, step_x)
+        if i > 0:
+            turns = round((out[2, i] - out[2, i - 1]) / (2.0 * np.pi))
+            out[2, i] -= 2.0 * np.pi * turns
         out[3, i] = 2.0 / np.hypot(step_x, step_y)
         out[4, i] = 2.0 / np.hypot(right[0] - left[0], right[1] - left[1])
         out[5, i] = rise_x * u + rise_y * v

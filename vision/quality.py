@@ -9,7 +9,7 @@ import numpy as np
 from .measurement import Measurement
 from .photo import Photo
 from .refine import Refined
-from .robust import quantile
+from .robust import median, quantile
 from .rod import Candidate
 from .specimen_frame import Setting, root_hidden
 from .state import LostError
@@ -100,7 +100,7 @@ def _goes_on(photo: Photo, refined: Refined) -> bool:
         lanes(photo.grey, curve, np.linspace(first, last, 9) * width, across)
         for first, last in ((-1.6, -1.0), (1.0, 3.0))
     )
-    rod = np.median(before[1:4])
-    paper = np.median(before[[0, 4]])
-    light = (np.median(behind, axis=1) - rod) / (paper - rod)
+    rod, paper = median(before[1:4].ravel()), median(before[::4].ravel())
+    light = np.array([median(lane) for lane in behind])
+    light = (light - rod) / (paper - rod)
     return bool(light[1:4].max() < 0.15 and min(light[0], light[4]) > 0.3)

@@ -177,14 +177,15 @@ def _in_frame(
     grid = fit.curve
     points, theta = grid.at(s)
     view = _view(camera, points, theta, setting)
-    heading = np.unwrap(view.heading)
+    heading = view.heading
     pose = Pose(
         x_mm=float(view.x_mm[0]), y_mm=float(view.y_mm[0]),
         angle_deg=float(np.degrees(heading[0])), height_mm=setting.rod_height_mm,
     )  # fmt: skip
     own = pose.from_board(np.column_stack([view.x_mm, view.y_mm]))
     # y runs down in the picture: there the heading turns the other way.
-    kappa_px = np.gradient(heading + theta, s) - np.interp(s, grid.s, grid.kappa)
+    kappa = np.gradient(heading + theta, s_mm[1])
+    kappa -= np.interp(s, grid.s, grid.kappa) * view.along
     table = _pixel_columns(refined, s, points, theta)
     across = _silhouette(view)
     wall = np.abs(view.rise_across) * table["width_px"] / across
@@ -194,7 +195,7 @@ def _in_frame(
         "x_mm": own[:, 0],
         "y_mm": own[:, 1],
         "theta_rad": heading - heading[0],
-        "kappa_per_mm": kappa_px * view.along,
+        "kappa_per_mm": kappa,
         "width_mm": table["width_px"] / across,
         "sigma_mm": table["sigma_px"] / view.along,
         "sigma_kappa_per_mm": np.interp(s, grid.s, fit.sigma_kappa) * view.along,
