@@ -28,6 +28,12 @@ _RECENT = 12
 _GRID_PX = 3.0
 """Distance of points along a rough curve."""
 
+_UNSEEN = 8
+"""Quarters of a width for which a curve is carried on before two edges are seen again."""
+
+_AS_LIGHT = 0.7
+"""Light of paper beyond what hid an edge, over that before it; a clamp is darker."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
@@ -142,8 +148,13 @@ def _carry_on(
     grey: Image, path: Array, head: int, width: float, step: float, sign: float,
     dark: float, level: float,
 ) -> int:  # fmt: skip
-    """Fill the path before `head` while there are two edges; return its new head."""
-    while head > 0 and len(path) - head >= 4:
+    """Fill the path before `head` while there are two edges; return its new head.
+
+    A hair or a speck beside the rod hides an edge: the path goes on unseen for a while,
+    and counts if two edges are seen again twice, with paper as light beside them.
+    """
+    seen, unseen, again, light = head, 0, 0, level - dark
+    while head > 0 and len(path) - head >= 4 and unseen <= _UNSEEN:
         x, y, u, v = _predict(path[head : head + _RECENT], step)
         beside = 0.5 * width + 4.0
         shade = min(
@@ -154,11 +165,21 @@ def _carry_on(
         low, high = _dark_span(grey, x, y, -v, u, beside + 2.0, sign, here)
         aside = 0.5 * (low + high)
         alike = abs(high - low - width) < 0.2 * width + 0.5
-        if not alike or abs(aside) > 0.2 * width:
+        if alike and abs(aside) <= 0.2 * width:
+            again += 1
+        elif sign * _streak(grey, x, y, u, v) < level:
+            aside, again = 0.0, 0
+        else:
             break
         head -= 1
         path[head, 0], path[head, 1] = x - aside * v, y + aside * u
-    return head
+        if again > 0 and unseen == 0:
+            seen, light = head, shade - dark
+        elif again >= 2 and shade - dark > _AS_LIGHT * light:
+            seen, unseen, light = head, 0, shade - dark
+        else:
+            unseen += 1
+    return seen
 
 
 @njit(cache=True)

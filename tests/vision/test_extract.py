@@ -229,6 +229,20 @@ def test_clamps_of_any_colour_at_any_side(colour, heading, angle):
     assert result.length_mm == pytest.approx(30.0, abs=0.08)
 
 
+@pytest.mark.parametrize("across_mm", [-0.8, 0.6, 0.8])
+def test_root_is_found_behind_a_speck(across_mm):
+    what, camera = scene(BLUE, 0.0, 40.0)
+    picture = render_scene(what, camera, np.random.default_rng(1))
+    pose = what.clamp.pose
+    place = np.array([[pose.x_mm + 1.6, pose.y_mm + across_mm]])
+    (speck,) = np.rint(camera.to_px(place, height_mm=0.9)).astype(int)
+    cv2.circle(picture, speck, 6, (40, 40, 40), cv2.FILLED)
+    result = extract(as_photo(picture), camera, rod_height_mm=0.9, clamp_height_mm=4.0)
+    assert result.ok, result.reason
+    assert "clamp_doubtful" not in result.flags
+    assert result.length_mm == pytest.approx(30.0, abs=0.08)
+
+
 def test_arm_that_reaches_far_into_the_picture_is_the_clamp_not_the_rod():
     what, camera = scene(BLACK, 0.0, 0.0, tilt_deg=0.0)
     pose = Pose(x_mm=62.0, y_mm=-15.0, angle_deg=0.0, height_mm=0.9)
