@@ -29,7 +29,7 @@ _GRID_PX = 3.0
 """Distance of points along a rough curve."""
 
 _UNSEEN = 8
-"""Quarters of a width for which a curve is carried on before two edges are seen again."""
+"""Quarters of a width that a curve is carried on before two edges are seen again."""
 
 _AS_LIGHT = 0.7
 """Light of paper beyond what hid an edge, over that before it; a clamp is darker."""
