@@ -218,6 +218,25 @@ def test_lens_views_recover_a_barrel_lens():
         assert error < 40.0
 
 
+def test_two_lens_views_do_not_bend_the_corners_of_a_long_lens():
+    """What no corner sees must stay as lenses are: a free k2 was off by 60 to 95 um."""
+    lens = {"focal_px": 3750.0, "height_mm": 250.0,
+            "distortion": (-0.12, 0.02, 0.0, 0.0, 0.0)}  # fmt: skip
+    truth = scene_camera(**lens, tilt_deg=7.0)
+    views = lens_views(lens, [(25.0, 20.0, 5.0), (30.0, 200.0, -8.0)])
+    found = calibrate(board_photo(truth), views, board=BOARD)
+    assert shape_error_um(found.to_mm(grid()), truth.to_mm(grid())) < 30.0
+
+
+def test_one_view_of_a_wide_lens_leaves_it_its_distortion():
+    lens = {"focal_px": 1280.0, "height_mm": 80.0, "tilt_deg": 4.0,
+            "distortion": (0.05, -0.05, 0.0, 0.0, 0.0)}  # fmt: skip
+    truth = scene_camera(**lens)
+    found = calibrate(board_photo(truth), board=BOARD)
+    assert found.distortion[1] == pytest.approx(-0.05, abs=0.03)
+    assert found.focal_px[0] == pytest.approx(1280.0, rel=0.04)
+
+
 def test_a_bad_lens_view_is_dropped_and_named():
     truth = scene_camera(**LENS, tilt_deg=6.0)
     views = lens_views(LENS, TILTS)
