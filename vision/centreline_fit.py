@@ -171,7 +171,7 @@ def fit_curve(
     theta : ndarray, shape (n,), optional
         Tangent angles to start from; otherwise from the points.
     stiffness : float, optional
-        Weight of the penalty, px^5 (px^7 for a moment of order 3); the most likely one
+        Weight of the penalty, px^5 (px^3 for a moment of order 1); the most likely one
         when not given.
     shared : float
         Neighbouring measurements that count as one: the fewer, the more supple the
@@ -189,9 +189,9 @@ def fit_curve(
     knots = knots_between(s[0], s[-1], spacing, joints)
     basis, middle = design(knots, s), design(knots, 0.5 * (s[1:] + s[:-1]))
     smooth = smooth or Smooth()
-    penalty, nullity = penalty_on_moment(knots, smooth)
     if theta is None:
         theta = _chord_angles(points)
+    penalty, nullity = penalty_on_moment(knots, smooth, s, theta)
     step = float(s[1] - s[0])
     coefficients = _start(basis, theta, penalty * spacing ** (2 * smooth.order + 1))
     start, *_ = _path(step, np.zeros(2), coefficients, basis, middle)

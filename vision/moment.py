@@ -5,7 +5,10 @@ better the fewer numbers it has to find. Elasticity leaves few: the curvature is
 the moment M(s) is smooth, and at a joint of two stiffnesses the curvature changes by a
 factor while M and its slope go through. Not so if the load changes there as well (a
 section magnetised otherwise). Which holds, and whether M is rather straight or rather
-a parabola, the Bayesian information criterion weighs (Schwarz 1978).
+what one force makes of it on a rod so bent (the elastica), the Bayesian information
+criterion weighs (Schwarz 1978). The force matters at the root of a strong bend: there a
+magnet at the tip pulls along the rod, M hardly falls, and carried on straight it would
+come out too large.
 """
 
 from __future__ import annotations
@@ -56,7 +59,7 @@ def weighed_fit(
             return free
         nearest = fit(Smooth(2, ratios))
         fits.append(fit(Smooth(2, _ratios(nearest.curve, joints))))
-    fits.append(fit(Smooth(3, _ratios(nearest.curve, joints))))
+    fits.append(fit(Smooth(1, _ratios(nearest.curve, joints))))
     loss = np.array([_criterion(item, count) for item in fits])
     loss[0] += _STRONG if joints else 0.0
     weights = np.exp(-0.5 * (loss - loss.min()))

@@ -124,7 +124,10 @@ class Smooth(NamedTuple):
     Parameters
     ----------
     order : int
-        The derivative that is small: 2 if M is nearly straight, 3 if nearly a parabola.
+        The derivative that is small: 2 if M is nearly straight. 1 if M' is nearly that
+        of a force which is the same all along the rod, of whatever size and direction:
+        F . n, n the rod's normal (Love 1927, art. 262); a magnetic field that is the
+        same all along does as much.
     ratios : tuple of float, optional
         Curvature beyond over curvature before each joint. M and its slope pass through
         a joint unchanged, so theta'' changes by this factor too. Without ratios nothing
@@ -135,11 +138,13 @@ class Smooth(NamedTuple):
     ratios: tuple[float, ...] | None = None
 
 
-def penalty_on_moment(knots: Array, smooth: Smooth) -> tuple[Array, int]:
-    """Return P with c^T P c the integral of M'' or M''' squared, and its nullity.
+def penalty_on_moment(
+    knots: Array, smooth: Smooth, s: Array, theta: Array
+) -> tuple[Array, int]:
+    """Return P with c^T P c the integral of M''^2 or (M' - F . n)^2, and its nullity.
 
-    M is a parabola between knots. Its second derivative jumps there, and a jump J
-    between pieces of length h counts as J^2 / h in the integral of M'''^2.
+    M is a parabola between knots. The force F is the one that makes the integral least;
+    the normals are those of a curve with angles theta at s.
     """
     first, length, bend, slope_at_start, slope_at_end = _pieces(knots)
     joined = np.diff(first) > 1
@@ -148,19 +153,50 @@ def penalty_on_moment(knots: Array, smooth: Smooth) -> tuple[Array, int]:
     stiffness = 1.0 / compliance[np.concatenate([[0], np.cumsum(joined)])][:, None]
     apart = 0.5 * (length[1:] + length[:-1])
     penalty = np.zeros((len(knots) - 4, len(knots) - 4))
-    bend = bend * stiffness
+    slope_at_start, slope_at_end = slope_at_start * stiffness, slope_at_end * stiffness
     if smooth.order == 2:
-        add_squares(first, bend, length, penalty)
+        add_squares(first, bend * stiffness, length, penalty)
     else:
-        _add_jumps(
-            first, bend, bend, np.where(tied | ~joined, 1.0, 0.0) / apart, penalty
-        )
+        # M' runs straight over a piece: the trapezoidal rule, on both its ends.
+        ends = np.interp(np.unique(knots), s, theta)
+        angles = np.concatenate([ends[:-1], ends[1:]])
+        _add_unforced(
+            np.concatenate([first, first]),
+            np.concatenate([slope_at_start, slope_at_end]),
+            np.column_stack([-np.sin(angles), np.cos(angles)]),
+            0.5 * np.concatenate([length, length]), penalty,
+        )  # fmt: skip
     if tied:
-        tie = _TIED * joined / apart ** (2 * smooth.order - 3)
-        _add_jumps(
-            first, slope_at_end * stiffness, slope_at_start * stiffness, tie, penalty
-        )
-    return penalty, 1 + smooth.order + joints * (1 if tied else smooth.order)
+        tie = _TIED * joined * apart ** (3.0 - 2.0 * smooth.order)
+        _add_jumps(first, slope_at_end, slope_at_start, tie, penalty)
+    free = 3 if smooth.order == 2 else 4
+    return penalty, free + joints * (1 if tied else 2)
+
+
+@njit(cache=True)
+def _add_unforced(
+    first: NDArray[np.int64], rows: Array, normals: Array, weight: Array, penalty: Array
+) -> None:
+    """Add the weighted squares of rows of M', less what a constant force explains."""
+    add_squares(first, rows, weight, penalty)
+    total = np.sum(weight)
+    for k in range(2):
+        load = normals[:, k].copy()
+        for j in range(k):
+            load -= normals[:, j] * np.sum(weight * load * normals[:, j])
+        power = np.sum(weight * load**2)
+        if power < 1e-9 * total:  # a straight rod: forces along it do not bend it
+            normals[:, k] = 0.0
+            continue
+        load /= np.sqrt(power)
+        normals[:, k] = load
+        part = np.zeros(len(penalty))
+        for i in range(first.size):
+            for j in range(4):
+                part[first[i] + j] += weight[i] * load[i] * rows[i, j]
+        for i in range(part.size):
+            for j in range(part.size):
+                penalty[i, j] -= part[i] * part[j]
 
 
 @njit(cache=True)

@@ -38,7 +38,7 @@ def test_penalty_is_the_integral_of_the_third_derivative_squared():
     middle = 0.5 * (knots[3:-4] + knots[4:-3])
     third = BSpline(knots, c, 3)(middle, nu=3)
     exact = np.sum(third**2 * np.diff(knots[3:-3]))
-    penalty, _ = penalty_on_moment(knots, Smooth())
+    penalty, _ = penalty_on_moment(knots, Smooth(), middle, 0.1 * middle)
     assert c @ penalty @ c == pytest.approx(exact, rel=1e-9)
 
 
