@@ -14,6 +14,9 @@ Image = NDArray[np.float32]
 EDGE_LEVEL, SHADED_LEVEL = 0.27, 0.4
 """Where a rough edge is, from rod to paper, and from rod to shade right beside it."""
 
+_UNEVEN = 3.0
+"""Spread of the widths, px, beyond which the edges are looked at again."""
+
 _BESIDE = 4.0
 """How far from a rough edge the light beside it is taken, px."""
 
@@ -59,7 +62,22 @@ def _rough_edges(
     strip = np.empty((len(points), 2 * half), dtype=np.float32)
     _sample(grey, points, normals, np.zeros(len(points)), 1.0, half, sign, strip)
     dark, paper = _dark_and_paper(strip)
-    level = dark + EDGE_LEVEL * (paper - dark)
+    low, high, level = _edges_at(strip, half, dark, dark + EDGE_LEVEL * (paper - dark))
+    if _spread(low, high) > _UNEVEN:
+        # Perhaps a deep shadow is taken for rod: it changes its width along a rod that
+        # bends, and the rod, seen at a level below the shadow's light, does not.
+        lower = dark + SHADED_LEVEL * EDGE_LEVEL * (paper - dark)
+        inner_low, inner_high, lower = _edges_at(strip, half, dark, lower)
+        if _spread(inner_low, inner_high) < 0.5 * _spread(low, high):
+            return inner_low, inner_high, dark, lower
+    return low, high, dark, level
+
+
+@njit(cache=True)
+def _edges_at(
+    strip: Image, half: int, dark: float, level: float
+) -> tuple[Array, Array, float]:
+    """Return the edges at a level, lowered under shade, and the lower side's level."""
     # Again under the shade that lies beside the dark, which may be far from white.
     low, high = _outermost(strip, half, level)
     left = dark + SHADED_LEVEL * (_light_at(strip, half, low - _BESIDE) - dark)
@@ -67,7 +85,14 @@ def _rough_edges(
     left, right = min(level, left), min(level, right)
     low, _ = _outermost(strip, half, left)
     _, high = _outermost(strip, half, right)
-    return low, high, dark, min(left, right)
+    return low, high, min(left, right)
+
+
+@njit(cache=True)
+def _spread(low: Array, high: Array) -> float:
+    """Return how far apart the widths are between which 70 % of them lie, px."""
+    most, least = np.nanquantile(high - low, 0.85), np.nanquantile(high - low, 0.15)
+    return float(most - least)
 
 
 @njit(cache=True)

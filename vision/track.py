@@ -167,6 +167,8 @@ def _carry_on(
         alike = abs(high - low - width) < 0.2 * width + 0.5
         if alike and abs(aside) <= 0.2 * width:
             again += 1
+        elif alike and abs(aside) <= 0.5 * width:
+            again = 0
         elif sign * _streak(grey, x, y, u, v) < level:
             aside, again = 0.0, 0
         else:

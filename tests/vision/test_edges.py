@@ -108,6 +108,14 @@ def test_rough_edges_see_through_a_shadow(shade):
     assert np.median(high - low) == pytest.approx(18.0, abs=1.0)
 
 
+def test_rough_edges_see_through_a_deep_shadow_that_fades():
+    image, points, normals = bar(0.0, 9.0, 0.8)
+    t = (points[0, 1] + np.arange(9, 24)).astype(int)
+    image[t] *= np.linspace(0.2, 0.4, image.shape[1], dtype=np.float32)
+    low, high, *_ = rough_edges(image, points, normals, reach=26.0)
+    assert np.median(high - low) == pytest.approx(18.0, abs=2.0)
+
+
 @pytest.mark.parametrize("fall", [0.0, 0.3, 0.5])
 def test_mask_survives_uneven_light(fall):
     image, *_ = bar(0.2, 5.0, 1.0, size=400)

@@ -15,7 +15,6 @@ S = np.arange(0.0, 601.0, 4.0)
 FINE = np.arange(0.0, 600.01, 0.25)
 
 
-
 def derivative(knots, s):
     """Rows that give kappa from the coefficients of theta."""
     basis = design(knots, s)
