@@ -19,11 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.errors import VisionError
+from .jpeg import is_damaged
 
 MAX_PIXELS = 64_000_000
 MIN_SIDE = 16
-_BLOCK = 8
-"""Rows of a JPEG block."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,8 +106,6 @@ def decode_photo(data: bytes, *, source: str = "data", linear: bool = False) -> 
     pixels = _decode(data, source, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH)
     if data[:8] == _PNG and data[25] in (4, 6):
         pixels = _with_alpha(data, source, pixels)
-    if data[:2] == _JPEG and any(_is_torn(np.rot90(pixels, k)) for k in range(4)):
-        raise VisionError(_DAMAGED.format(source=source))
     return as_photo(pixels, source=source, linear=linear)
 
 
@@ -227,12 +224,13 @@ def _on_white(pixels: NDArray[Any]) -> NDArray[Any]:
 
 
 def _check_whole(data: bytes, source: str) -> None:
-    """Refuse what decoders fill up with grey: PNG and JPEG files that are cut off."""
+    """Refuse what decoders patch up: PNG and JPEG files that are cut off or damaged."""
     if data[:8] == _PNG:
         size, whole = _png_size(data), _png_whole(data)
     elif data[:2] == _JPEG:
         size = _jpeg_size(data)
         whole = data.rfind(b"\xff\xd9") > data.rfind(b"\xff\xda") > 0
+        whole = whole and not is_damaged(data)
     else:
         return
     if size is None or not whole:
@@ -242,20 +240,6 @@ def _check_whole(data: bytes, source: str) -> None:
             f"{source}: a photograph must have at most {MAX_PIXELS / 1e6:.0f} "
             f"megapixels; instead received {size[0]} x {size[1]} px"
         )
-
-
-def _is_torn(pixels: NDArray[Any]) -> bool:
-    """Whether noisy rows end in rows of one grey, with which decoders fill a loss.
-
-    A drawing may end so too, but is as flat above. EXIF may have turned the rows.
-    """
-    flat = pixels[-1, 0]
-    if np.any(pixels[-_BLOCK:] != flat) or flat in (0, np.iinfo(pixels.dtype).max):
-        return False
-    last = int(np.flatnonzero(np.any(pixels != flat, axis=1)).max(initial=0))
-    above = pixels[max(last - 8 * _BLOCK, 0) : max(last - _BLOCK, 0)]
-    blocks = above[:, : above.shape[1] // _BLOCK * _BLOCK].reshape(-1, _BLOCK)
-    return bool(blocks.size and np.mean(np.ptp(blocks, axis=1) > 0) > 0.3)
 
 
 def _png_size(data: bytes) -> tuple[int, int] | None:
