@@ -4,9 +4,10 @@
 
 One row a light and scale (nine shapes each): errors in pixels against the truth, the
 share of points within one standard deviation, and CPU time of one thread without
-decoding, the best of five. Then, for the 2-megapixel frames: the time of each stage,
-and that of the peers' skeleton of the same frames, whose mask is given to them. Errors
-of the peers: `bench_vision_peers.py`; frames per second: `bench_vision_batch.py`.
+decoding, the best of five. Then, for the 2-megapixel frames: the own time of each
+stage, and that of the peers' skeleton of the same frames, whose mask is given to them.
+Errors of the peers: `bench_vision_peers.py`; frames per second:
+`bench_vision_batch.py`.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ STAGES = {
     "refine": "extract", "find_joints": "refine", "measurement": "extract",
     "doubts": "extract",
 }  # fmt: skip
-"""What is timed, and the module that calls it; joints are sought within `refine`."""
+"""What is timed, and the module that calls it; joints are sought within `refine`, and
+count for themselves."""
 
 
 def best_ms(photo, calibration, repeats=5) -> float:
@@ -42,36 +44,41 @@ def best_ms(photo, calibration, repeats=5) -> float:
 
 
 def stages_ms(pairs, repeats=5) -> dict[str, float]:
-    """Median over frames of the best time of each stage, around the very calls."""
+    """Mean over frames of the own time of each stage and of the rest.
+
+    Each frame's best run counts, so the stages add up to the mean time of a frame.
+    """
     modules = {n: import_module(f"magbend.vision.{m}") for n, m in STAGES.items()}
     kept = {name: getattr(module, name) for name, module in modules.items()}
     spent: dict[str, float] = defaultdict(float)
 
-    def timed(name):
+    def timed(name, function):
         def call(*args, **options):
-            start = time.process_time()
+            within, start = sum(spent.values()), time.process_time()
             try:
-                return kept[name](*args, **options)
+                return function(*args, **options)
             finally:
-                spent[name] += time.process_time() - start
+                within -= sum(spent.values())
+                spent[name] += time.process_time() - start + within
 
         return call
 
     rows = []
     try:
         for name, module in modules.items():
-            setattr(module, name, timed(name))
-        for photo, camera in pairs:
+            setattr(module, name, timed(name, kept[name]))
+        whole = timed("rest", extract)
+        for pair in pairs:
             runs = []
             for _ in range(repeats):
                 spent.clear()
-                extract(photo, camera)
-                runs.append([spent[name] for name in STAGES])
-            rows.append(np.min(runs, axis=0))
+                whole(*pair)
+                runs.append([spent[name] for name in (*STAGES, "rest")])
+            rows.append(min(runs, key=sum))
     finally:
         for name, module in modules.items():
             setattr(module, name, kept[name])
-    return dict(zip(STAGES, 1e3 * np.median(rows, axis=0), strict=True))
+    return dict(zip((*STAGES, "rest"), 1e3 * np.mean(rows, axis=0), strict=True))
 
 
 def cpu_ms(work, inputs) -> float:
@@ -132,8 +139,12 @@ def main() -> None:
         )
         pairs = [(as_photo(one.image), one.truth.calibration) for one in chosen]
         whole = cpu_ms(lambda pair: extract(*pair), pairs)
-        stages = ", ".join(f"{name} {ms:.2f}" for name, ms in stages_ms(pairs).items())
-        print(f"without decoding: median {whole:.1f} ms ({stages})")
+        stages = stages_ms(pairs)
+        parts = " + ".join(f"{name} {ms:.2f}" for name, ms in stages.items())
+        print(
+            f"without decoding: median {whole:.1f} ms, "
+            f"mean {sum(stages.values()):.2f} = {parts}"
+        )
         masks = [rod_mask(one)[0] for one in chosen]
         path = cpu_ms(lambda mask: longest_path(skeletonize(mask)), masks)
         print(f"scikit-image skeletonize + skan, mask given: median {path:.1f} ms")

@@ -154,7 +154,7 @@ def _of_width(
 ) -> list[Candidate]:  # fmt: skip
     """Return the parts of a thing that are about `half` wide to either side."""
     reach = 1.5 * half + 1.0
-    fat = _near((depth > reach).view(np.uint8), reach + 1.0)
+    fat = _near(depth, reach, reach + 1.0)
     thin = roi & ~fat & 1
     parts, _ = cv2.findContours(thin, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     found = []
@@ -190,17 +190,24 @@ def _edge_distance(
     return depth
 
 
-def _near(core: Mask, reach: float) -> Mask:
-    """Mark what is within `reach` of a mask."""
-    near = np.zeros_like(core)
-    x, y, w, h = cv2.boundingRect(core)
-    if w == 0:
-        return near
-    margin = int(reach) + 2
-    x0, y0 = max(x - margin, 0), max(y - margin, 0)
-    window = (slice(y0, y + h + margin), slice(x0, x + w + margin))
-    away = cv2.distanceTransform(1 - core[window], cv2.DIST_L2, 5)
-    near[window] = away <= reach
+@njit(cache=True)
+def _near(depth: NDArray[np.float32], core: float, reach: float) -> Mask:
+    """Mark what is within `reach` of where the depth exceeds `core`."""
+    height, width = depth.shape
+    near = np.zeros((height, width), np.uint8)
+    rows = int(reach)
+    aside = np.sqrt(reach**2 - np.arange(rows + 1) ** 2).astype(np.int64)
+    for i in range(height):
+        j = 0
+        while j < width:
+            first = j
+            while j < width and depth[i, j] > core:
+                j += 1
+            if j > first:
+                for k in range(max(i - rows, 0), min(i + rows + 1, height)):
+                    span = aside[abs(k - i)]
+                    near[k, max(first - span, 0) : j + span] = 1
+            j += 1
     return near
 
 
