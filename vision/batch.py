@@ -35,7 +35,6 @@ from .photo import Photo, read_photo
 _log = logging.getLogger(__name__)
 
 _CHUNK = 8
-_DOUBTFUL_SCALE = 5e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,7 +124,7 @@ def measure(photo: Photo, settings: Settings) -> Measurement:
                 f"{settings.bare.size_px} and {photo.size_px} px",
             )
         photo = replace(photo, grey=_flattened(photo, settings.bare))
-    found = extract(
+    return extract(
         photo,
         settings.calibration,
         rod_height_mm=settings.rod_height_mm,
@@ -135,18 +134,6 @@ def measure(photo: Photo, settings: Settings) -> Measurement:
         clamp=settings.clamp,
         clamp_height_mm=settings.clamp_height_mm,
     )
-    if found.ok and _height_is_doubtful(settings):
-        return replace(found, flags=(*found.flags, "height_doubtful"))
-    return found
-
-
-def _height_is_doubtful(settings: Settings) -> bool:
-    """Whether the rod's height leaves the scale unknown by more than 0.05 %."""
-    if settings.calibration is None or settings.rod_height_mm == 0.0:
-        return False
-    camera = settings.calibration
-    doubt = camera.camera_height_sd_mm / camera.camera_height_mm**2
-    return math.isinf(doubt) or abs(settings.rod_height_mm) * doubt > _DOUBTFUL_SCALE
 
 
 def extract_files(

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .calibration import Calibration
 from .measurement import Measurement
 from .photo import Photo
 from .refine import Refined
@@ -19,6 +20,9 @@ LENGTH_TOLERANCE = 0.02
 
 TURN_MM = 0.15
 """What the standard deviation of the direction at the clamp may do to the tip."""
+
+SCALE = 5e-4
+"""Doubt of the scale, for want of the camera's height, above which it is named."""
 
 SHADE_PX = 0.04
 """Pull of a shade on the midline, before correction, above which it is named."""
@@ -62,6 +66,8 @@ def doubts(
     flags: list[str] = []
     if setting.calibration is None:
         flags.append("uncalibrated")
+    elif _scale_sd(setting.calibration, setting.rod_height_mm) > SCALE:
+        flags.append("height_doubtful")
     if candidate.root == "border":
         flags.append("clamp_at_border")
     if candidate.root == "free":
@@ -85,6 +91,14 @@ def doubts(
     if nominal is not None and abs(length / nominal - 1.0) > LENGTH_TOLERANCE:
         flags.append("length_mismatch")
     return replace(result, flags=tuple(flags))
+
+
+def _scale_sd(camera: Calibration, rod_height_mm: float) -> float:
+    """Return how well the scale is known at the rod's height, relative."""
+    if rod_height_mm == 0.0:
+        return 0.0
+    height = camera.camera_height_mm
+    return abs(rod_height_mm) * camera.camera_height_sd_mm / height**2
 
 
 def _goes_on(photo: Photo, refined: Refined) -> bool:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from magbend.vision import as_photo
+from magbend.vision import as_photo, extract
 from magbend.vision.binarise import binarise
+from magbend.vision.calibration import scale_calibration
 from magbend.vision.curve import Curve
 from magbend.vision.measurement import Measurement
 from magbend.vision.quality import _goes_on, doubts
@@ -59,3 +61,20 @@ def test_direction_that_leaves_the_tip_unsure_is_doubted():
 
     assert "direction_doubtful" not in flags(0.25)  # 0.13 mm at the tip
     assert "direction_doubtful" in flags(0.35)  # 0.18 mm
+
+
+@pytest.mark.parametrize(
+    ("camera_height_mm", "rod_height_mm", "doubtful"),
+    [(None, 0.0, False), (None, 0.9, True), (330.0, 0.9, False), (60.0, 2.0, True)],
+)
+def test_height_that_cannot_be_corrected_is_doubted(
+    camera_height_mm, rod_height_mm, doubtful
+):
+    frame = draw(curve("arc", angle_deg=70.0), np.random.default_rng(0))
+    photo = as_photo(frame.image)
+    camera = scale_calibration(
+        mm_per_px=0.05, image_size_px=photo.size_px, camera_height_mm=camera_height_mm
+    )
+    found = extract(photo, camera, rod_height_mm=rod_height_mm)
+    assert found.ok
+    assert ("height_doubtful" in found.flags) is doubtful
