@@ -153,6 +153,9 @@ def _look(grey: Image, state: State, sign: float, turn: int) -> Seen:
     points, theta = state.curve.at(s)
     normals = np.column_stack([-np.sin(theta), np.cos(theta)])
     half = np.interp(s, state.curve.s, state.half)
+    # Where the blur, of variance v, moves edges of curvature k: by k v / 2.
+    bend = np.interp(s, state.curve.s, state.curve.kappa)
+    points += (0.5 * state.blur**2 * bend)[:, None] * normals
     # At first the edges lie where they are expected to a pixel or two.
     reach, fuzz = min(0.35 * width, 6.0 + 0.1 * width), min(0.1 * width, 3.0)
     if turn:
