@@ -16,12 +16,16 @@ from numpy.typing import NDArray
 
 from ..core.jit import njit
 from .curve import Curve
-from .tip import STEP_PX, EndFace, crossings_of, lanes, line_through
+from .tip import SPAN, STEP_PX, EndFace, crossings_of, fit_step, lanes, line_through
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 
 _LANES = np.linspace(-0.5, 0.5, 9)
+_BESIDE = np.linspace(0.5, 2.0, 13)
+_CLAMP_SPAN = 3.0
+"""So many blurs of the clamp are fitted: its foot and the corner over the rod are dark,
+and only what lies right beside the line makes the step."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +52,18 @@ class ClampLines:
         return ClampLines(face=face, front=front)
 
 
+def between(first: float, second: float, lines: ClampLines) -> float:
+    """Return a place between those that each of two lines tells.
+
+    What shade does to a line goes with the inverse of its step's height, and so does
+    the noise: the weight is the square of that.
+    """
+    face, front = lines.face, lines.front
+    a = 0.0 if face is None else face.rise**2
+    b = 0.0 if front is None else front.rise**2
+    return (a * first + b * second) / (a + b) if a + b > 0.0 else 0.5 * (first + second)
+
+
 def find_clamp(
     grey: Image,
     curve: Curve,
@@ -58,6 +74,7 @@ def find_clamp(
     contrast: float,
     reach: float,
     sign: float = 1.0,
+    fine: bool = True,
 ) -> ClampLines:
     """Find the clamp's lines near an expected arc length (s falls into the clamp).
 
@@ -75,6 +92,8 @@ def find_clamp(
         Light of paper minus light of rod.
     sign : float
         -1 for a light rod.
+    fine : bool
+        Whether to fit a step after taking the half level.
 
     Returns
     -------
@@ -82,18 +101,21 @@ def find_clamp(
         Each None where it is not seen.
     """
     near = max(1.5, 2.2 * blur)
-    span = reach + near + 8.0
+    span = reach + near + max(8.0, SPAN * blur)
     s = np.arange(expected - span, expected + span, STEP_PX)
     return ClampLines(
-        face=_face(grey, curve, s, expected, width, near, contrast, reach, sign),
-        front=_front(grey, curve, s, expected, width, near, contrast, reach, sign),
+        face=_face(grey, curve, s, expected, width, blur, contrast, reach, sign, fine),
+        front=_front(
+            grey, curve, s, expected, width, blur, contrast, reach, sign, fine
+        ),
     )
 
 
 def _face(
-    grey: Image, curve: Curve, s: Array, expected: float, width: float, near: float,
-    contrast: float, reach: float, sign: float,
+    grey: Image, curve: Curve, s: Array, expected: float, width: float, blur: float,
+    contrast: float, reach: float, sign: float, fine: bool,
 ) -> EndFace | None:  # fmt: skip
+    near = max(1.5, 2.2 * blur)
     across = 0.6 * _LANES * width
     light = np.ascontiguousarray(lanes(grey, curve, s, across, sign)[:, ::-1])
     place = _steepest(light, -s[::-1], -expected, reach, 0.12 * contrast)
@@ -101,26 +123,43 @@ def _face(
         return None
     crossing = crossings_of(light, -s[::-1], place, near, 3.0, 4.0, reach=4.0)
     line = line_through(across, crossing)
-    return None if line is None else _turned(line)
+    if line is None:
+        return None
+    if fine:
+        line = fit_step(
+            light, -s[::-1], across, line, crossing, blur=blur, inner=SPAN * blur,
+            outer=_CLAMP_SPAN * blur,
+        )  # fmt: skip
+    return replace(line, s=-line.s, skew=-line.skew)
 
 
 def _front(
-    grey: Image, curve: Curve, s: Array, expected: float, width: float, near: float,
-    contrast: float, reach: float, sign: float,
+    grey: Image, curve: Curve, s: Array, expected: float, width: float, blur: float,
+    contrast: float, reach: float, sign: float, fine: bool,
 ) -> EndFace | None:  # fmt: skip
-    beside = (1.05 + 1.1 * _LANES) * width + near + 3.0
-    crossings: list[float] = []
-    offsets: list[float] = []
+    near = max(1.5, 2.2 * blur)
+    beside = _BESIDE * width + near + 3.0
+    crossings: list[Array] = []
+    offsets: list[Array] = []
+    seen: list[Array] = []
     for across in (-beside[::-1], beside):
         light = lanes(grey, curve, s, across, sign)
         place = _steepest(light, s, expected, reach, 0.15 * contrast)
         if np.isnan(place):
             continue
-        crossings.extend(crossings_of(light, s, place, near, 3.0, 4.0, reach=4.0))
-        offsets.extend(across)
-    if len(offsets) < len(_LANES):
+        crossings.append(crossings_of(light, s, place, near, 3.0, 4.0, reach=4.0))
+        offsets.append(across)
+        seen.append(light)
+    if not offsets:
         return None
-    return line_through(np.array(offsets), np.array(crossings))
+    across, crossing = np.concatenate(offsets), np.concatenate(crossings)
+    line = line_through(across, crossing)
+    if line is None or not fine:
+        return line
+    return fit_step(
+        np.concatenate(seen), s, across, line, crossing, blur=blur,
+        inner=_CLAMP_SPAN * blur, outer=SPAN * blur,
+    )  # fmt: skip
 
 
 @njit(cache=True)
@@ -139,10 +178,3 @@ def _steepest(
             if rise > best:
                 best, place = rise, centre
     return place
-
-
-def _turned(line: EndFace) -> EndFace:
-    return EndFace(
-        s=-line.s, sigma=line.sigma, skew=-line.skew, scatter=line.scatter,
-        found=line.found,
-    )  # fmt: skip

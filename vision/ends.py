@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .clamp import ClampLines, find_clamp
+from .clamp import ClampLines, between, find_clamp
 from .curve import Curve
 from .robust import median
 from .rod import Root
@@ -17,6 +17,10 @@ Image = NDArray[np.float32]
 
 APART_PX = 2.0
 """The two lines at a clamp tell different things if they are farther apart."""
+
+
+_FINE = 2
+"""The first pass whose ends are more than places to look at next."""
 
 
 def find_ends(
@@ -33,7 +37,7 @@ def find_ends(
     taper = median(edges.width[end]) if end.sum() > 3 else width
     tip = find_tip(
         grey, curve, expected=state.last + outwards, width=min(width, taper),
-        blur=state.blur, reach=reach, middle=middle, sign=sign,
+        blur=state.blur, reach=reach, middle=middle, sign=sign, fine=turn >= _FINE,
     )  # fmt: skip
     if tip is None:
         raise LostError("no_tip", "the free end of the rod has no edge")
@@ -45,13 +49,22 @@ def find_ends(
         grey, curve, expected=state.first - (0.25 * width if turn == 0 else 0.0),
         width=width, blur=state.blur, contrast=edges.contrast,
         reach=1.3 * width if turn == 0 else 0.3 * width + 3.0, sign=sign,
+        fine=turn >= _FINE,
     )  # fmt: skip
+    return tip, lines, _first(lines, state.face_px)
+
+
+def _first(lines: ClampLines, face_px: float) -> float:
+    """Return the arc length where the rod begins, as it is seen."""
     line = lines.face or lines.front
     if line is None:
         raise LostError("no_clamp", "it is not seen where the rod leaves the clamp")
-    if lines.front is not None and is_face(lines.front.s - line.s, state.face_px):
-        line = lines.front  # what has edges between them is no rod
-    return tip, lines, line.s
+    if lines.front is None:
+        return line.s
+    apart = lines.front.s - line.s
+    if is_face(apart, face_px):
+        return lines.front.s  # what has edges between them is no rod
+    return line.s if abs(apart) > APART_PX else between(line.s, lines.front.s, lines)
 
 
 def is_face(apart: float, face_px: float) -> bool:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .calibration import Calibration
+from .clamp import between
 from .curve import Curve
 from .ends import APART_PX, is_face
 from .measurement import Measurement, Pose
@@ -254,21 +255,20 @@ def _root(refined: Refined, ends: LocalView, setting: Setting, side_mm: float) -
     if len(seen_at) == 2 and abs(seen_at[1] - seen_at[0]) > APART_PX:
         apart = seen_at[1] - seen_at[0]
         return seen_at[is_face(apart, setting.face_px(refined.fit.curve))]
-    return float(np.mean(seen_at)) if seen_at else 0.0
+    if len(seen_at) == 2:
+        return between(*seen_at, refined.clamp)
+    return seen_at[0] if seen_at else 0.0
 
 
 def _hidden_root(refined: Refined, ends: LocalView, setting: Setting) -> float:
     """Return the root where the clamp's top edge hides it: by height, or by length."""
-    lines = refined.clamp
-    line = None if lines is None else lines.face or lines.front
-    seen = 0.0 if line is None else line.s
     rise, along = float(ends.rise_along[0]), float(ends.along[0])
     if setting.clamp_height_mm is not None:
-        return seen - rise * (setting.clamp_height_mm - setting.rod_height_mm)
+        return -rise * (setting.clamp_height_mm - setting.rod_height_mm)
     if setting.length_mm is None:
-        return seen
-    missing = setting.length_mm * along - (refined.tip.s - seen)
-    return seen - float(np.clip(missing, 0.0, 10.0 * rise))
+        return 0.0
+    missing = setting.length_mm * along - refined.tip.s
+    return -float(np.clip(missing, 0.0, 10.0 * rise))
 
 
 def root_hidden(refined: Refined, setting: Setting) -> bool:

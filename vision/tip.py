@@ -8,7 +8,7 @@ between rod and paper, and a straight line through the crossings is the end face
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,9 @@ STEP_PX = 0.5
 _SHARE = 0.62
 """Part of the width that the lanes cover: clear of blurred or rounded corners."""
 _LANES = np.linspace(-0.5, 0.5, 13) * _SHARE
+SPAN = 5.5
+"""So many blurs of paper are fitted: fewer leave its slope in doubt, and shade is
+straight no farther."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +46,8 @@ class EndFace:
         RMS distance of the crossings from the line, px.
     found : float
         Part of the lanes that crossed.
+    rise : float
+        Light behind the line minus light before it, of the step that was fitted.
     """
 
     s: float
@@ -50,6 +55,7 @@ class EndFace:
     skew: float
     scatter: float
     found: float
+    rise: float = 0.0
 
 
 def lanes(
@@ -102,6 +108,7 @@ def find_tip(
     reach: float,
     middle: float = 0.0,
     sign: float = 1.0,
+    fine: bool = True,
 ) -> EndFace | None:
     """Find the end face near an expected arc length.
 
@@ -119,6 +126,8 @@ def find_tip(
         Offset of the lanes' centre from the curve, px.
     sign : float
         -1 for a light rod.
+    fine : bool
+        Whether to fit a step after taking the half level.
 
     Returns
     -------
@@ -127,7 +136,7 @@ def find_tip(
     """
     near = max(1.5, 2.2 * blur)
     inner = max(4.0, 0.5 * width)
-    outer = max(4.0, 3.0 * blur)
+    outer = max(4.0, SPAN * blur)
     s = np.arange(
         expected - reach - near - inner,
         expected + reach + near + outer + STEP_PX,
@@ -138,8 +147,100 @@ def find_tip(
     place = _rough_end(light[3:-3].mean(axis=0), s, expected, reach, near, inner)
     if place is None:
         return None
-    crossing = crossings_of(light, s, place, near, inner, outer, reach=0.5 * width)
-    return line_through(across - middle, crossing)
+    crossing = crossings_of(
+        light, s, place, near, inner, max(4.0, 3.0 * blur), reach=0.5 * width
+    )
+    line = line_through(across - middle, crossing)
+    if line is None or not fine:
+        return line
+    return fit_step(
+        light, s, across - middle, line, crossing, blur=blur, inner=inner, outer=outer
+    )
+
+
+def fit_step(
+    light: Array, s: Array, across: Array, line: EndFace, crossing: Array, *,
+    blur: float, inner: float, outer: float,
+) -> EndFace:  # fmt: skip
+    """Return a line moved to where a blurred step fits the lanes best.
+
+    Least squares of the step between two levels, the outer one with a slope, blurred by
+    a Gaussian: all samples near the line count, each by what it knows of the place, and
+    the levels come as near to the line as the blur allows. A half level between levels
+    taken clear of the blur knows less (they are carried farther) and is biased by the
+    blur's tails.
+
+    Parameters
+    ----------
+    light : ndarray, shape (k, m)
+        Lanes, as from `lanes`.
+    s : ndarray, shape (m,)
+        Even grid of arc length, rising from rod to paper.
+    across : ndarray, shape (k,)
+        Offsets of the lanes.
+    line : EndFace
+        Through the crossings at half level.
+    crossing : ndarray, shape (k,)
+        These; lanes that cross far from the line are left out.
+    blur : float
+        Standard deviation of the blur, px; how far the crossings scatter about the line
+        comes on top.
+    inner, outer : float
+        How far before and behind the line to fit, px.
+    """
+    wide = math.hypot(blur, line.scatter)
+    away = np.abs(crossing - line.s - line.skew * across)
+    near = away < 3.5 * (line.scatter + 0.02)
+    place, skew, rise = _fit_step(
+        light[near], s, across[near], line.s, line.skew, wide, inner, outer
+    )
+    if not (abs(place - line.s) < 2.0 * wide and rise > 0.0):
+        return line
+    return replace(line, s=place, skew=skew, rise=rise)
+
+
+@njit(cache=True)
+def _fit_step(
+    light: Array, s: Array, across: Array, place: float, skew: float, blur: float,
+    inner: float, outer: float,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Gauss-Newton: two levels, the outer one's slope, and the line's two numbers.
+
+    Returns place and skew of the line, and the height of the step.
+    """
+    change, height = np.empty(5), 0.0
+    for _ in range(2):
+        normal, right = np.zeros((5, 5)), np.zeros(5)
+        for i in range(across.size):
+            at = place + skew * across[i]
+            first = max(int(np.ceil((at - inner - s[0]) / (s[1] - s[0]))), 0)
+            last = min(int((at + outer - s[0]) / (s[1] - s[0])), s.size - 1)
+            for k in range(first, last + 1):
+                t = (s[k] - at) / blur
+                outside = 0.5 * (1.0 + math.erf(t / math.sqrt(2.0)))
+                bell = math.exp(-0.5 * t * t) / math.sqrt(2.0 * math.pi)
+                change[0] = 1.0 - outside
+                change[1] = outside
+                change[2] = t * outside + bell
+                change[3] = -bell
+                change[4] = -bell * across[i]
+                if not np.isfinite(light[i, k]):
+                    continue
+                for a in range(5):
+                    right[a] += change[a] * light[i, k]
+                    for b in range(a + 1):
+                        normal[a, b] += change[a] * change[b]
+        for a in range(5):
+            for b in range(a):
+                normal[b, a] = normal[a, b]
+        if not np.linalg.det(normal) > 0.0:
+            return place, skew, 0.0
+        found = np.linalg.solve(normal, right)
+        height = found[1] - found[0]
+        step = blur / height
+        place += step * found[3]
+        skew += step * found[4]
+    return place, skew, height
 
 
 def line_through(across: Array, crossing: Array) -> EndFace | None:

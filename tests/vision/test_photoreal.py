@@ -36,8 +36,8 @@ def test_one_board_tells_a_tilted_camera_with_a_barrel_lens(name):
 @pytest.mark.parametrize(
     ("name", "rms_px", "rms_mm", "tip_mm"),
     [
-        # Bent at once behind the clamp, its direction there is known to 2 degrees.
-        ("ph_C11", 0.12, 0.25, 0.65),
+        # Bent at once behind the clamp, where its direction is hard to see.
+        ("ph_C11", 0.12, 0.05, 0.15),
         ("ph_C13", 0.12, 0.02, 0.05),
         # Its wall lies in a deep shadow and mirrors less paper than walls do.
         ("ph_D18", 0.20, 0.10, 0.20),
