@@ -48,7 +48,7 @@ def test_a_straight_moment_over_jumping_stiffness_costs_nothing():
 
 
 def elastica(force, kappa_root, compliance=COMPLIANCE):
-    """Angle and curvature of a rod under one force: M' = F . n, M = kappa / compliance."""
+    """Angle and curvature of a rod under one force: (kappa / compliance)' = F . n."""
     theta, moment, angles, moments = 0.0, kappa_root, [], []
     step = FINE[1] - FINE[0]
     for factor in compliance:
