@@ -90,9 +90,10 @@ class Edges:
         variance = (median(rise) / _ROOT_2PI) ** 2 - _SLOPE_VARIANCE
         return math.sqrt(max(variance, 0.01))
 
-    def usable(self) -> NDArray[np.bool_]:
-        """Stations with both edges, of a width like the others'."""
-        away = np.abs(self.width - median(self.width))
+    def usable(self, walls: Array | float = 0.0) -> NDArray[np.bool_]:
+        """Stations with both edges, of a width like the others' but for side walls."""
+        width = self.width - walls
+        away = np.abs(width - median(width))
         return np.asarray(away < max(5.0 * 1.4826 * median(away), 0.6))
 
     def shaded(self, blur: float) -> Array:
@@ -144,8 +145,8 @@ def find_edges(
         NaN where no edge was found.
     """
     half = 0.5 * (median(high) - median(low))
-    gap, window = level_span(blur, fuzz)
-    gaps = max(0.6, 1.1 * max(blur, fuzz)), gap
+    close, gap, window = level_spans(blur, fuzz)
+    gaps = close, gap
     span = max(reach + 1.0, gaps[1] + window)
     # Samples lie a quarter of a pixel and more to either side of the expected edge; a
     # profile reaches no further in than the axis.
@@ -169,10 +170,10 @@ def find_edges(
     )  # fmt: skip
 
 
-def level_span(blur: float, fuzz: float) -> tuple[float, float]:
-    """Return how far from the edge levels are taken, and over how much, in px."""
+def level_spans(blur: float, fuzz: float) -> tuple[float, float, float]:
+    """Return where levels are taken, px: close to the edge, clear of it; how far on."""
     wide = max(blur, fuzz)
-    return max(1.5, 2.2 * wide), max(4.0, 3.0 * wide)
+    return max(0.6, 1.1 * wide), max(1.5, 2.2 * wide), max(4.0, 3.0 * wide)
 
 
 @njit(cache=True)

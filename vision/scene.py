@@ -23,6 +23,7 @@ from .calibration import Calibration
 from .measurement import Pose
 from .raster import coverage, coverage_of, strip
 from .srgb import encode_srgb
+from .wall_light import reflectance
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.float32]
@@ -34,8 +35,9 @@ BLACK: Colour = (0.045, 0.045, 0.045)
 PAPER: Colour = (0.70, 0.71, 0.71)
 RUBBER: Colour = (0.048, 0.048, 0.048)
 
-SHEEN = 0.13
-"""What a wall of the rod mirrors of the paper to a camera that grazes it, in light."""
+SHEEN, WALL_SKY = 0.4, 0.4
+"""What a wall of the rod mirrors of the paper, over Fresnel's reflectance of a smooth
+one, and its diffuse light over the top's: those of path-traced rubber."""
 _MOSAIC = 0.6
 """Noise that three channels share, over the noise of one alone: about 1/sqrt(3)."""
 
@@ -410,25 +412,37 @@ def _draw_rod(picture: Picture, scene: Scene, camera: Calibration) -> None:
     top = coverage(_rod_outline(scene, camera, levels[-1]), *size)
     np.maximum(walls, top, out=walls)
     walls = _beside(walls, top)
-    _paint(picture, walls, _scaled(RUBBER, 0.75))
-    picture += (SHEEN * walls * _from_clamp(scene, camera))[..., None]
+    mirrored = SHEEN * walls * _mirroring(scene, camera)
+    seen = mirrored[..., None] * picture
+    _paint(picture, walls, _scaled(RUBBER, WALL_SKY))
+    picture += seen
     _paint(picture, top, RUBBER)
     if scene.light.gloss > 0.0:
         _draw_gloss(picture, scene, camera, levels[-1])
 
 
-def _from_clamp(scene: Scene, camera: Calibration) -> Picture:
-    """Return how much of the paper a rod's walls mirror: 0 beside the clamp, then 1."""
-    ends = np.array([[0.0, 0.0], [scene.side_mm, 0.0]])
-    root, ahead = camera.to_px(
-        scene.clamp.pose.to_board(ends), height_mm=scene.clamp.pose.height_mm
-    )
-    x, y = (ahead - root) / np.sum((ahead - root) ** 2)
-    width, height = camera.image_size_px
-    away = np.add.outer(
-        y * (np.arange(height) - root[1]), x * (np.arange(width) - root[0])
-    )
-    return np.asarray(1.0 - np.exp(-np.maximum(away, 0.0)), dtype=np.float32)
+def _mirroring(scene: Scene, camera: Calibration) -> Picture:
+    """Return the reflectance of the rod's walls: Fresnel's, halved beside the clamp."""
+    size = camera.image_size_px
+    out = np.zeros(size[::-1], dtype=np.float32)
+    line, pose = scene.centreline, scene.clamp.pose
+    if line is None:
+        return out
+    axis = pose.to_board(line.points_mm)
+    left = np.column_stack([-np.sin(line.theta_rad), np.cos(line.theta_rad)])
+    beside = pose.to_board(line.points_mm + left)
+    at = camera.to_px(axis, height_mm=pose.height_mm)
+    across = camera.to_px(beside, height_mm=pose.height_mm) - at
+    rise = camera.to_px(axis, height_mm=pose.height_mm + 1.0) - at
+    steep = np.abs(np.sum(rise * across, axis=1)) / np.sum(across**2, axis=1)
+    value = reflectance(steep) * (1.0 - 0.5 * np.exp(-line.s_mm / scene.side_mm))
+    thick = math.ceil(4.0 * scene.side_mm * float(np.hypot(*across.T).max()))
+    pixels = np.round(at).astype(int)
+    for k in range(len(pixels) - 1, 0, -1):
+        cv2.line(
+            out, pixels[k].tolist(), pixels[k - 1].tolist(), float(value[k]), thick
+        )
+    return out
 
 
 def _draw_gloss(

@@ -80,15 +80,18 @@ class Setting:
         s_mm = _arc(points)
         return [float(np.interp(joint, s_mm, curve.s)) for joint in self.joints_mm]
 
-    def walls_px(self, points: Array, theta: Array, width_px: float) -> Array:
+    def walls_px(
+        self, points: Array, theta: Array, width_px: float
+    ) -> tuple[Array, Array]:
         """Return how wide the side walls are seen, positive on the left; see `refine`.
 
-        Only with a calibration.
+        And the gap below them, alike. Only with a calibration.
         """
         if self.calibration is None:
-            return np.zeros(len(points))
+            return np.zeros(len(points)), np.zeros(len(points))
         view = _view(self.calibration, points, theta, self)
-        return view.rise_across * width_px / _silhouette(view)
+        wall = view.rise_across * width_px / _silhouette(view)
+        return wall, view.rise_across * self.rod_height_mm - 0.5 * wall
 
     def face_px(self, curve: Curve) -> float:
         """Return how much of a clamp's face may be seen at the root of a curve."""

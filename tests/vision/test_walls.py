@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from magbend.core.centreline import Centreline
-from magbend.vision import as_photo, extract, scene, wall_light
+from magbend.vision import as_photo, edges, extract, scene, wall_light
 from magbend.vision.measurement import Pose
 from magbend.vision.wall_light import short_of_end
 
@@ -24,19 +24,51 @@ def phi(z):
 
 
 @pytest.mark.parametrize("wall", [0.3, 1.0, 2.2, 4.0])
-def test_half_level_of_two_steps(wall):
-    gap, window, blur, light = 2.0, 4.0, 0.9, 0.17
+@pytest.mark.parametrize("light", [0.17, 0.5, -0.2])
+def test_half_level_of_two_steps(wall, light):
+    gap, window, blur = 1.0, 4.0, 0.9
     (x,) = short_of_end(np.array([wall]), np.array([light]), blur, gap, window)
     level = (1.0 - light) * phi(-x / blur) + light * phi((wall - x) / blur)
-    part = min(max((wall - gap) / window, 0.0), 1.0)
-    assert level == pytest.approx(0.5 * (1.0 + light * part), abs=1e-12)
-    assert 0.0 < x <= light * wall * 1.5
+    inside = gap + window * (np.arange(400) + 0.5) / 400
+    part = np.mean([phi((wall - t) / blur) - phi(-t / blur) for t in inside])
+    assert level == pytest.approx(0.5 * (1.0 + light * part), abs=1e-5)
+    assert 0.0 <= x / light <= wall * 1.7
 
 
 def test_no_wall_and_a_wall_wider_than_where_the_rods_level_is_taken():
     walls = np.array([0.0, 40.0])
     short = short_of_end(walls, np.full(2, 0.17), 0.9, 2.0, 4.0)
-    assert short == pytest.approx(0.0, abs=1e-9)
+    assert short == pytest.approx(0.0, abs=2e-3)
+
+
+def test_reflectance_is_fresnels():
+    n = wall_light.REFRACTION
+    steep = np.tan(np.radians([1e-4, 90.0 - 1e-4]))
+    grazing, upright = wall_light.reflectance(steep)
+    assert grazing == pytest.approx(1.0, abs=1e-4)
+    assert upright == pytest.approx(((n - 1.0) / (n + 1.0)) ** 2, rel=1e-6)
+    # At Brewster's angle only the light across the plane of incidence is left.
+    (brewster,) = wall_light.reflectance(np.array([1.0 / n]))
+    assert brewster == pytest.approx(0.5 * ((n**2 - 1.0) / (n**2 + 1.0)) ** 2, rel=1e-6)
+
+
+def share(paper, slope=0.0, clamp=0.0, wall=2.0):
+    one = np.ones(1)
+    return float(
+        wall_light.wall_light(
+            wall * one, 3.0 * one, 20.0, 0.05 * one, paper * one, slope * one, clamp
+        )[0]
+    )
+
+
+def test_a_wall_mirrors_the_paper_it_faces():
+    lit, shaded = share(0.6), share(0.15)
+    assert lit > shaded
+    assert shaded < 0.1
+    assert share(0.15, slope=0.02) > shaded  # the shade ends near by
+    assert share(0.6, wall=1.0) > lit  # seen at a more grazing angle
+    assert share(0.6, clamp=0.5) < lit
+    assert share(float("nan")) == 0.0
 
 
 def measured(toward_deg, seed=0):
@@ -63,7 +95,21 @@ def test_the_middle_is_the_axis_from_either_side(toward_deg):
 @pytest.mark.parametrize("toward_deg", [90.0, -90.0])
 def test_scenes_draw_walls_as_dark_as_the_top_where_they_are(monkeypatch, toward_deg):
     monkeypatch.setattr(scene, "SHEEN", 0.0)
-    monkeypatch.setattr(wall_light, "WALL_LIGHT", 0.0)
+    monkeypatch.setattr(scene, "WALL_SKY", 1.0)
+    monkeypatch.setattr(wall_light, "MIRRORED", 0.0)
+    monkeypatch.setattr(wall_light, "SKY", 1.0)
     error, width = measured(toward_deg)
     assert abs(error) < 0.02
     assert width == pytest.approx(1.0, abs=0.003)
+
+
+def test_edges_are_of_use_where_no_wall_is_seen_on_a_bent_rod():
+    width = np.concatenate([np.linspace(27.0, 29.0, 60), np.full(240, 29.0)])
+    level = np.full(300, 1.0)
+    found = edges.Edges(
+        low=-0.5 * width, high=0.5 * width, slope_low=level, slope_high=level,
+        inner=0.0 * level, outer_low=level, outer_high=level, shade_low=0.0 * level,
+        shade_high=0.0 * level,
+    )  # fmt: skip
+    assert not found.usable().all()
+    assert found.usable(width - 27.0).all()
