@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +14,7 @@ from .robust import median
 from .rod import Root
 from .state import LostError, Seen, State
 from .tip import EndFace, find_tip
+from .wall_light import WALL_LIGHT, Walls, short_of_end
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -24,7 +28,8 @@ _FINE = 2
 
 
 def find_ends(
-    grey: Image, state: State, seen: Seen, root: Root, sign: float, turn: int
+    grey: Image, state: State, seen: Seen, root: Root, sign: float, turn: int,
+    walls: Walls | None,
 ) -> tuple[EndFace, ClampLines | None, float]:  # fmt: skip
     """Return the tip, the lines at a clamp, and the arc length where the rod begins."""
     curve, width = state.curve, state.width
@@ -41,6 +46,8 @@ def find_ends(
     )  # fmt: skip
     if tip is None:
         raise LostError("no_tip", "the free end of the rod has no edge")
+    if walls is not None and turn >= _FINE:
+        tip = _to_end_of_face(tip, state, walls)
     if root == "border":
         return tip, None, _border_crossing(grey, curve)
     if root == "free":
@@ -52,6 +59,19 @@ def find_ends(
         fine=turn >= _FINE,
     )  # fmt: skip
     return tip, lines, _first(lines, state.face_px)
+
+
+def _to_end_of_face(tip: EndFace, state: State, walls: Walls) -> EndFace:
+    """Move the tip to where the end face ends, which is lighter where it is seen.
+
+    Across the heading's right angle, the end face is a side wall. A step fitted to a
+    blurred profile takes the half level of what is blurred once more.
+    """
+    points, theta = state.curve.at(np.array([tip.s]))
+    wall = np.maximum(walls(points, theta + 0.5 * np.pi, state.width), 0.0)
+    blur = math.sqrt(2.0) * state.blur
+    short = short_of_end(wall, np.array([WALL_LIGHT]), blur, float(wall[0]), 1.0)
+    return replace(tip, s=tip.s + float(short[0]))
 
 
 def _first(lines: ClampLines, face_px: float) -> float:

@@ -128,7 +128,7 @@ def _pass(
 ) -> tuple[Refined, float]:  # fmt: skip
     """Return what is seen along the curve, and where on it the rod begins."""
     seen = _look(grey, state, sign, turn)
-    tip, lines, first = find_ends(grey, state, seen, root, sign, turn)
+    tip, lines, first = find_ends(grey, state, seen, root, sign, turn, walls)
     clamped = root == "clamp"
     if walls is not None:
         seen = to_wall_ends(state, seen, first, walls, clamped=clamped)
