@@ -56,26 +56,26 @@ def to_wall_ends(
     places = np.linspace(seen.s[0], seen.s[-1], WALL_PLACES)
     wall, gap = walls(*state.curve.at(places), state.width)
     edges, width = seen.edges, state.width
-    levels = _levels_at(
+    top, paper, slope = _levels_at(
         places, wall, 0.5 * width / float(seen.s[1]), edges.inner, edges.outer_low,
         edges.outer_high, edges.shade_low, edges.shade_high,
     )  # fmt: skip
-    seen_wide = np.abs(wall)
-    clamp = CLAMP * np.exp(-np.maximum(places - first, 0.0) / width) if clamped else 0.0
-    light = wall_light(
-        seen_wide, 2.0 * np.abs(gap) + 0.5 * seen_wide, width, *levels, clamp
-    )
+    wide, away = np.abs(wall), 2.0 * np.abs(gap) + 0.5 * np.abs(wall)
+    beside = np.exp(-np.maximum(places - first, 0.0) / width)
+    mirrors = MIRRORED * (1.0 - CLAMP * beside * float(clamped))
+    light = wall_light(wide, away, width, top, paper, slope, mirrors, SKY)
     close, _, window = level_spans(state.blur, state.fuzz)
-    short = short_of_end(seen_wide, light, state.blur, close, window)
+    short = short_of_end(wide, light, state.blur, close, window)
     low, high = edges.low.copy(), edges.high.copy()
-    walls_px = _move(wall, short, low, high)
+    at = _move(wall, short, low, high)
     moved = replace(edges, low=low, high=high)
-    return replace(seen, edges=moved, good=moved.usable(walls_px))
+    return replace(seen, edges=moved, good=moved.usable(at))
 
 
+@njit(cache=True)
 def wall_light(
     wall: Array, away: Array, width: float, top: Array, paper: Array, slope: Array,
-    clamp: Array | float = 0.0,
+    mirrors: Array, sky: float,
 ) -> Array:  # fmt: skip
     """Return the light of walls above the top's, over the paper's above the top's.
 
@@ -89,17 +89,24 @@ def wall_light(
     top, paper, slope : ndarray, shape (n,)
         Light of the rod's top and of the paper beside the wall, and the rise of the
         latter outwards, per px. NaN gives 0.
-    clamp : ndarray, shape (n,), or float
-        What of the mirrored light a clamp takes.
+    mirrors : ndarray, shape (n,)
+        What a wall mirrors, over what Fresnel's formula gives.
+    sky : float
+        Its own light over the top's.
     """
-    steep = wall / np.maximum(width - wall, 1.0)
-    within = _MOST_SLOPE * np.abs(paper)
-    mirrored = paper + np.clip(slope * away, -within, within)
-    light = MIRRORED * (1.0 - clamp) * reflectance(steep) * mirrored + SKY * top
-    contrast = np.maximum(paper - top, 0.1 * np.abs(paper) + 1e-6)
-    return np.nan_to_num(np.clip((light - top) / contrast, _LEAST, _MOST))
+    light = np.zeros_like(wall)
+    share = mirrors * reflectance(wall / np.maximum(width - wall, 1.0))
+    for i in range(wall.size):
+        within = _MOST_SLOPE * abs(paper[i])
+        mirrored = paper[i] + min(max(slope[i] * away[i], -within), within)
+        above = share[i] * mirrored + sky * top[i] - top[i]
+        above /= max(paper[i] - top[i], 0.1 * abs(paper[i]) + 1e-6)
+        if not np.isnan(above):
+            light[i] = min(max(above, _LEAST), _MOST)
+    return light
 
 
+@njit(cache=True)
 def reflectance(steep: Array) -> Array:
     """Return Fresnel's reflectance of upright walls for light that is not polarised.
 

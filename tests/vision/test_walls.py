@@ -52,11 +52,18 @@ def test_reflectance_is_fresnels():
     assert brewster == pytest.approx(0.5 * ((n**2 - 1.0) / (n**2 + 1.0)) ** 2, rel=1e-6)
 
 
-def share(paper, slope=0.0, clamp=0.0, wall=2.0):
+def share(paper, slope=0.0, mirrors=0.35, wall=2.0):
     one = np.ones(1)
     return float(
         wall_light.wall_light(
-            wall * one, 3.0 * one, 20.0, 0.05 * one, paper * one, slope * one, clamp
+            wall * one,
+            3.0 * one,
+            20.0,
+            0.05 * one,
+            paper * one,
+            slope * one,
+            mirrors * one,
+            0.5,
         )[0]
     )
 
@@ -67,7 +74,7 @@ def test_a_wall_mirrors_the_paper_it_faces():
     assert shaded < 0.1
     assert share(0.15, slope=0.02) > shaded  # the shade ends near by
     assert share(0.6, wall=1.0) > lit  # seen at a more grazing angle
-    assert share(0.6, clamp=0.5) < lit
+    assert share(0.6, mirrors=0.2) < lit
     assert share(float("nan")) == 0.0
 
 
