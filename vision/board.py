@@ -18,6 +18,9 @@ from ..core.errors import InputError, VisionError
 
 Array = NDArray[np.float64]
 
+STRANGE_MARKERS = 2
+"""So many markers of other numbers may be misread from print and dirt."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Board:
@@ -78,10 +81,9 @@ class Board:
 
     def _check_dictionary(self) -> None:
         held = len(_dictionary(self.dictionary).bytesList)
-        needed = self.columns * self.rows // 2
-        if held < needed:
+        if held < self.markers:
             raise InputError(
-                f"dictionary must hold the {needed} markers of a board of "
+                f"dictionary must hold the {self.markers} markers of a board of "
                 f"{self.columns} x {self.rows} squares; instead {self.dictionary} "
                 f"holds {held}"
             )
@@ -94,6 +96,11 @@ class Board:
             (self.columns + extra) * self.square_mm,
             (self.rows + extra) * self.square_mm,
         )
+
+    @property
+    def markers(self) -> int:
+        """Number of markers of a ChArUco board."""
+        return self.columns * self.rows // 2
 
     @property
     def inner(self) -> tuple[int, int]:
@@ -218,7 +225,7 @@ def find_corners(
     Raises
     ------
     VisionError
-        If fewer than six corners are found.
+        If fewer than six corners are found, or markers of another board.
     """
     if board.kind == "chessboard":
         ids, points = _find_chessboard(grey, board)
@@ -237,7 +244,13 @@ def _find_charuco(
     grey: NDArray[np.uint8], board: Board
 ) -> tuple[NDArray[np.int64], Array]:
     detector = cv2.aruco.CharucoDetector(board.charuco())
-    corners, ids, _, _ = detector.detectBoard(grey)
+    corners, ids, _, markers = detector.detectBoard(grey)
+    strange = np.ravel([] if markers is None else markers) >= board.markers
+    if np.count_nonzero(strange) > STRANGE_MARKERS:
+        raise VisionError(
+            f"{np.count_nonzero(strange)} markers are not on a board of "
+            f"{board.columns} x {board.rows} squares: say which board was photographed"
+        )
     if ids is None or corners is None:
         return np.empty(0, dtype=np.int64), np.empty((0, 2))
     points = np.asarray(corners, dtype=np.float64).reshape(-1, 2)

@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 BAD_VIEW = 3.0
 """A lens view is dropped when its RMS is this many times the median of all views."""
 
+FLAT = 0.02
+"""RMS of the plane's corners, in sides of a square, above which no board lay flat."""
+
 _TURN = np.diag([1.0, -1.0, -1.0])  # from our board frame to OpenCV's
 
 
@@ -69,7 +72,8 @@ def calibrate(
     Raises
     ------
     VisionError
-        If the plane's photograph shows no board or a mirrored one.
+        If the plane's photograph shows no board, a mirrored one, or one whose corners
+        are not those of a flat board.
 
     Notes
     -----
@@ -177,6 +181,7 @@ def _calibration(
             f"{plane.source}: the board appears mirrored; photograph its printed side, "
             "not through the paper or a mirror"
         )
+    _check_flat(calibration, board, plane.source)
     if bundle.distance_relative_sd > 0.3 and source == "perspective of one view":
         source = "hardly known: one view squarely from above"
     return Calibration(
@@ -188,6 +193,17 @@ def _calibration(
         camera_height_sd_mm=height * bundle.distance_relative_sd,
         camera_height_source=source,
     )
+
+
+def _check_flat(calibration: Calibration, board: Board, source: str) -> None:
+    square_mm = board.square_mm * board.print_scale
+    square_px = square_mm / calibration.mm_per_px(calibration.centre_px, height_mm=0.0)
+    if calibration.rms_px > FLAT * square_px:
+        raise VisionError(
+            f"{source}: its corners lie {calibration.rms_px:.1f} px (RMS) off a flat "
+            f"board with squares of {square_px:.0f} px; lay the board flat, focus on "
+            "it, and say which board it is"
+        )
 
 
 def calibrate_known_length(

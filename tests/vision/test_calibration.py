@@ -283,6 +283,23 @@ def test_photograph_without_a_board_is_refused(level):
         calibrate(photo, board=BOARD)
 
 
+def test_board_with_more_rows_than_said_is_refused():
+    """Its squares may be of another size, and the scale would be wrong by that."""
+    printed = Board(columns=7, rows=7, square_mm=7.0, marker_mm=5.25)
+    picture = render_board(printed, scene_camera(), np.random.default_rng(0))
+    with pytest.raises(VisionError, match="which board"):
+        calibrate(as_photo(picture), board=BOARD)
+    assert calibrate(as_photo(picture), board=printed).rms_px < 0.1
+
+
+def test_board_that_is_not_flat_is_refused():
+    photo = board_photo(scene_camera())
+    bent = photo.grey.copy()
+    bent[:, 800:] = np.roll(bent, 25, axis=0)[:, 800:]
+    with pytest.raises(VisionError, match="flat"):
+        calibrate(replace(photo, grey=bent), board=BOARD)
+
+
 def test_mirrored_board_is_refused():
     photo = board_photo(scene_camera())
     with pytest.raises(VisionError):
