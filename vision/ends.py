@@ -14,7 +14,7 @@ from .robust import median
 from .rod import Root
 from .state import LostError, Seen, State
 from .tip import EndFace, find_tip
-from .wall_light import WALL_LIGHT, Walls, short_of_end
+from .wall_light import Walls, short_of_end, wall_light
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -47,7 +47,7 @@ def find_ends(
     if tip is None:
         raise LostError("no_tip", "the free end of the rod has no edge")
     if walls is not None and turn >= _FINE:
-        tip = _to_end_of_face(tip, state, walls)
+        tip = _to_end_of_face(tip, state, seen, walls)
     if root == "border":
         return tip, None, _border_crossing(grey, curve)
     if root == "free":
@@ -61,16 +61,20 @@ def find_ends(
     return tip, lines, _first(lines, state.face_px)
 
 
-def _to_end_of_face(tip: EndFace, state: State, walls: Walls) -> EndFace:
+def _to_end_of_face(tip: EndFace, state: State, seen: Seen, walls: Walls) -> EndFace:
     """Move the tip to where the end face ends, which is lighter where it is seen.
 
-    Across the heading's right angle, the end face is a side wall. A step fitted to a
-    blurred profile takes the half level of what is blurred once more.
+    A right angle on, the end face is a side wall. A step fitted to a blurred profile
+    takes the half level of what is blurred once more.
     """
     points, theta = state.curve.at(np.array([tip.s]))
-    wall = np.maximum(walls(points, theta + 0.5 * np.pi, state.width), 0.0)
+    wall, gap = walls(points, theta + 0.5 * np.pi, state.width)
+    wall = np.maximum(wall, 0.0)
+    top = np.array([median(seen.edges.inner[seen.good])])
+    away = 2.0 * np.abs(gap) + 0.5 * wall
+    light = wall_light(wall, away, state.width, top, top + tip.rise, np.zeros(1))
     blur = math.sqrt(2.0) * state.blur
-    short = short_of_end(wall, np.array([WALL_LIGHT]), blur, float(wall[0]), 1.0)
+    short = short_of_end(wall, light, blur, float(wall[0]), 1.0)
     return replace(tip, s=tip.s + float(short[0]))
 
 
