@@ -14,7 +14,7 @@ from .robust import median
 from .rod import Root
 from .state import LostError, Seen, State
 from .tip import EndFace, find_tip
-from .wall_light import Walls, short_of_end, wall_light
+from .wall_light import MIRRORED, SKY, Walls, short_of_end, wall_light
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -72,7 +72,9 @@ def _to_end_of_face(tip: EndFace, state: State, seen: Seen, walls: Walls) -> End
     wall = np.maximum(wall, 0.0)
     top = np.array([median(seen.edges.inner[seen.good])])
     away = 2.0 * np.abs(gap) + 0.5 * wall
-    light = wall_light(wall, away, state.width, top, top + tip.rise, np.zeros(1))
+    level, mirrors = np.zeros(1), np.full(1, MIRRORED)
+    paper = top + tip.rise
+    light = wall_light(wall, away, state.width, top, paper, level, mirrors, SKY)
     blur = math.sqrt(2.0) * state.blur
     short = short_of_end(wall, light, blur, float(wall[0]), 1.0)
     return replace(tip, s=tip.s + float(short[0]))
