@@ -30,6 +30,9 @@ _BROKEN = (
 )  # fmt: skip
 """What numerics raise on pictures that hold no rod after all."""
 
+_PALER = 0.25
+"""How much lighter than the rod, of the paper's light, a thing is that is no rod."""
+
 LEAST_LENGTH = 0.08
 """Shortest rod, in diagonals of the picture: below that it is dust, hair or print."""
 
@@ -147,7 +150,9 @@ def _choose(binary: Binary, clamp: Clamp) -> Candidate:
             continue
         rod = _likeliest(rods)
         _refuse_second(rod, rods)
-        if rod.root != "free":
+        # What shows only where less is dark may be the clamp's shade: seek its root.
+        alike = best is None or _is_part(best, rod)
+        if rod.root != "free" and alike:
             return _accept(rod)
         best = best or rod
     if best is None:
@@ -168,14 +173,32 @@ def _levels(binary: Binary) -> list[float]:
     return [*higher, first] if binary.inverted else [first, *higher]
 
 
+def _is_part(one: Candidate, other: Candidate) -> bool:
+    """Whether a candidate's middle lies on another."""
+    middle = one.points_px[len(one.points_px) // 2]
+    away = np.hypot(*(other.points_px - middle).T).min()
+    return bool(away < max(one.width_px, other.width_px))
+
+
 def _likeliest(rods: list[Candidate]) -> Candidate:
-    """Return the longest, but rather one in a clamp than one from the border."""
-    clamped = [
+    """Return the longest that is no hair, but rather one in a clamp than another."""
+    thick = [
         rod
         for rod in rods
-        if rod.root == "clamp" and rod.length_px > LEAST_SHARE * rods[0].length_px
+        if not any(
+            rod.width_px < 0.5 * other.width_px
+            and rod.root != "clamp"
+            and other.length_px > LEAST_SHARE * rod.length_px
+            and other.ratio < rod.ratio + 0.1
+            for other in rods
+        )
     ]
-    return clamped[0] if clamped else rods[0]
+    clamped = [
+        rod
+        for rod in thick
+        if rod.root == "clamp" and rod.length_px > LEAST_SHARE * thick[0].length_px
+    ]
+    return clamped[0] if clamped else thick[0]
 
 
 def _refuse_second(first: Candidate, rods: list[Candidate]) -> None:
@@ -185,6 +208,7 @@ def _refuse_second(first: Candidate, rods: list[Candidate]) -> None:
         if other is not first
         and 0.5 < other.width_px / first.width_px < 2.0
         and other.length_px > 0.4 * first.length_px
+        and other.ratio < first.ratio + _PALER
     ]
     if len(alike) == 1:
         raise LostError(

@@ -21,7 +21,7 @@ def level_sets(piece: Mask, seeds: Mask | None, half: float) -> Array | None:
     """Return the centres of the geodesic level sets, shape (n, 2), root to tip."""
     smooth = piece
     if half >= 3.0:
-        size = 2 * int(0.35 * half) + 1
+        size = 2 * int(0.5 * half) + 1
         kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
         smooth = np.asarray(cv2.morphologyEx(piece, cv2.MORPH_OPEN, kernel), np.uint8)
         if seeds is not None:

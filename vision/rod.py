@@ -30,6 +30,9 @@ LEAST_SLENDERNESS = 6.0
 LEAST_SHARE = 0.2
 """Shortest rod beside another long thin thing, over the length of that."""
 
+_HAIR = 0.35
+"""Width of what grows from the tip of a rod in a clamp, over the rod's, if a hair."""
+
 _BIN, _HALVED = 0.09, 8
 """Width of a bin of log width, and bins from one width to half of it."""
 
@@ -126,26 +129,65 @@ def _thin_parts(roi: Mask, origin: tuple[int, int], binary: Binary) -> list[Cand
     """Return the thin parts of a thing: of the commonest width, or grown from that."""
     depth = _edge_distance(roi, origin, binary)
     ridge = _ridge(depth)
-    common, thinner = _half_widths(ridge)
-    found = _of_width(roi, depth, common, origin, binary) if common else []
+
+    def of_width(half: float) -> list[Candidate]:
+        return _of_width(roi, depth, half, origin, binary) if half else []
+
+    common, thinner, thicker = _half_widths(ridge)
+    found = of_width(common)
     if not found and common < _GRAIN:
         # Grains of noise along the edges of something wide may outnumber the rod.
-        common, thinner = _half_widths(ridge[ridge >= _GRAIN])
-        found = _of_width(roi, depth, common, origin, binary) if common else []
-    if not thinner:
-        return found
+        common, thinner, thicker = _half_widths(ridge[ridge >= _GRAIN])
+        found = of_width(common)
+    found = _without_hairs(found, of_width(thicker))
     # A bar that reaches far into the picture is long and thin itself, but the clamp of
-    # a thinner one that grows from it.
+    # a thinner one that grows from its end.
     longest = max((item.length_px for item in found), default=0.0)
     palest = max((item.ratio for item in found), default=1.0)
     grown = [
         item
-        for item in _of_width(roi, depth, thinner, origin, binary)
+        for item in of_width(thinner)
         if item.root == "clamp"
         and item.length_px > LEAST_SHARE * longest
         and item.ratio < palest + 0.1
+        and not any(_touches(item, bar) and not _from_end(item, bar) for bar in found)
     ]
     return grown or found
+
+
+def _without_hairs(found: list[Candidate], thicker: list[Candidate]) -> list[Candidate]:
+    """Leave out what grows from the side of a rod: hairs and lines that touch it."""
+    rods = [
+        rod
+        for rod in thicker
+        if (rod.root != "free" or any(_touches(item, rod) for item in found))
+        and not any(_from_end(item, rod) or _is_end(item, rod) for item in found)
+    ]
+    return [
+        *(item for item in found if not any(_touches(item, rod) for rod in rods)),
+        *rods,
+    ]
+
+
+def _from_end(one: Candidate, other: Candidate) -> bool:
+    """Whether a thing grows from the free end of another, which is its clamp then."""
+    away = np.hypot(*(other.points_px[-1] - one.points_px[0]))
+    return (
+        bool(away < 1.5 * other.width_px)
+        and one.length_px > LEAST_SHARE * other.length_px
+        and (other.root == "border" or one.width_px > _HAIR * other.width_px)
+    )
+
+
+def _is_end(one: Candidate, other: Candidate) -> bool:
+    """Whether a thing is the outer part of another: a rod with its clamp."""
+    return bool(np.hypot(*(other.points_px[-1] - one.points_px[-1])) < other.width_px)
+
+
+def _touches(one: Candidate, other: Candidate) -> bool:
+    """Whether a thing grows from beside another."""
+    away = np.hypot(*(other.points_px - one.points_px[0]).T).min()
+    return bool(away < 1.5 * other.width_px)
 
 
 def _of_width(
@@ -212,14 +254,14 @@ def _near(depth: NDArray[np.float32], core: float, reach: float) -> Mask:
 
 
 @njit(cache=True)
-def _half_widths(ridge: NDArray[np.float32]) -> tuple[float, float]:
+def _half_widths(ridge: NDArray[np.float32]) -> tuple[float, float, float]:
     """Return the half widths that long and thin parts of the medial axis share.
 
-    First the commonest for its width, then the commonest of much thinner ones; 0 where
-    there is none long enough.
+    First the commonest for its width, then the commonest of much thinner and of much
+    thicker ones; 0 where there is none long enough.
     """
     if ridge.size < 8:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     bins = np.floor(np.log(ridge) / _BIN).astype(np.int64)
     lowest = bins.min()
     bins -= lowest
@@ -229,13 +271,16 @@ def _half_widths(ridge: NDArray[np.float32]) -> tuple[float, float]:
     width = np.exp(_BIN * (lowest + np.arange(count.size)))
     score = count / np.sqrt(width)
     best = np.argmax(score)
-    common = np.median(ridge[np.abs(bins - best) <= 2])
-    if best <= _HALVED:
-        return common, 0.0
-    second = np.argmax(score[: best - _HALVED])
-    if count[second] < 2.0 * LEAST_SLENDERNESS * width[second]:
-        return common, 0.0
-    return common, np.median(ridge[np.abs(bins - second) <= 2])
+    apart = np.abs(np.arange(count.size) - best) > _HALVED
+    score[~apart | (count < 2.0 * LEAST_SLENDERNESS * width)] = 0.0
+    found = np.zeros(3)
+    found[0] = np.median(ridge[np.abs(bins - best) <= 2])
+    for k in range(1, 3):
+        side = score[:best] if k == 1 else score[best:]
+        if side.size and side.max() > 0.0:
+            other = np.argmax(side) + (0 if k == 1 else best)
+            found[k] = np.median(ridge[np.abs(bins - other) <= 2])
+    return found[0], found[1], found[2]
 
 
 @njit(cache=True)

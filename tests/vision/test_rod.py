@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 
@@ -61,3 +62,20 @@ def test_bar_alone_is_a_rod_from_the_border():
     (bar,) = candidates(things((0, 180, 420, 40)))
     assert bar.root == "border"
     assert bar.width_px == pytest.approx(40.0, abs=3.0)
+
+
+@pytest.mark.parametrize("at", [230, 300, 395])
+def test_hair_across_a_rod_is_no_rod(at):
+    mask = things(CLAMP, ROD)
+    cv2.line(mask, (at - 60, 110), (at + 60, 270), 1, 2)
+    rod = candidates(mask)[0]
+    assert rod.root == "clamp"
+    assert rod.contacts == 1
+    assert rod.width_px == pytest.approx(10.0, abs=2.0)
+    assert rod.length_px == pytest.approx(250.0, abs=20.0)
+
+
+def test_line_longer_than_the_rod_that_it_crosses_is_no_rod():
+    mask = things(CLAMP, ROD)
+    cv2.line(mask, (320, 20), (300, 390), 1, 4)
+    assert candidates(mask)[0].width_px == pytest.approx(10.0, abs=2.0)
