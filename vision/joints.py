@@ -93,7 +93,9 @@ def find_joints(
             break
         best = float(free[int(np.argmax(joined))])
         joints = _settled(model, [*joints, best], 0.25 * width)
-    return sorted(joints)
+    # What settles beside an end is shade: nothing else was looked for there.
+    near = _APART * width
+    return sorted(x for x in joints if s[0] + near < x < s[-1] - near)
 
 
 def _free(places: Array, joints: list[float], apart: float) -> Array:

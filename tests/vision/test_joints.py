@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from magbend.vision import joints
 from magbend.vision.joints import find_joints
 
 WIDTH = 20.0
@@ -53,3 +54,23 @@ def test_a_rod_too_short_for_joints_has_none() -> None:
     assert not find_joints(
         s, 0.01 * s, 0.0 * s, np.ones_like(s), width=WIDTH, shared=SHARED
     )
+
+
+@pytest.mark.parametrize("moved", [30.0, 570.0])
+def test_what_settles_beside_an_end_is_no_joint(monkeypatch, moved) -> None:
+    def kappa(s):
+        return 1.2e-3 * (1.0 + (s > 200.0) + 1.5 * (s > 400.0)) * (1.0 - s / 900.0)
+
+    settle = joints._settled
+    monkeypatch.setattr(
+        joints,
+        "_settled",
+        lambda model, found, step: [
+            x if abs(x - moved) > 200.0 else moved for x in settle(model, found, step)
+        ],
+    )
+    s, theta, offset = offsets(kappa, 0.05, 0)
+    found = joints.find_joints(
+        s, theta, offset, np.ones_like(s), width=WIDTH, shared=SHARED
+    )  # fmt: skip
+    assert all(abs(x - moved) > 100.0 for x in found)
