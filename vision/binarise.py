@@ -9,7 +9,7 @@ edges are measured later in the full picture.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import cv2
@@ -100,14 +100,7 @@ def binarise(grey: NDArray[np.float32], *, invert: bool | None = None) -> Binary
 
 def rebinarise(binary: Binary, threshold: float) -> Binary:
     """Return the same picture at another level."""
-    return Binary(
-        ratio=binary.ratio,
-        mask=_mask(binary.ratio, threshold),
-        factor=binary.factor,
-        inverted=binary.inverted,
-        dark=binary.dark,
-        threshold=threshold,
-    )
+    return replace(binary, mask=_mask(binary.ratio, threshold), threshold=threshold)
 
 
 def _mask(ratio: NDArray[np.float32], threshold: float) -> NDArray[np.uint8]:

@@ -197,7 +197,7 @@ def _of_width(
     """Return the parts of a thing that are about `half` wide to either side."""
     reach = 1.5 * half + 1.0
     fat = _near(depth, reach, reach + 1.0)
-    thin = roi & ~fat & 1
+    thin = (roi > fat).view(np.uint8)
     parts, _ = cv2.findContours(thin, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     found = []
     for part in parts:
