@@ -115,9 +115,8 @@ def _walk(
     place, word, held, spare, restarts = 0, np.uint64(0), 0, 0, 0
     for unit in range(units):
         if interval and unit and unit % interval == 0:
-            place, word, held, spare = _filled(coded, place, word, held, spare)
-            at_marker = spare > 0 and coded[place + 1] == 0xD0 + restarts % 8
-            if not at_marker or held - spare >= 8:
+            place = _marker(coded, place, word, held, spare)
+            if place < 0 or coded[place + 1] != 0xD0 + restarts % 8:
                 return False
             place, word, held, spare = place + 2, np.uint64(0), 0, 0
             restarts += 1
@@ -127,8 +126,20 @@ def _walk(
             )
             if held < spare:
                 return False
+    return _marker(coded, place, word, held, spare) >= 0
+
+
+@njit(cache=True)
+def _marker(coded: Bytes, place: int, word: np.uint64, held: int, spare: int) -> int:
+    """Return the place of the next marker; -1 if more than padding stands before it.
+
+    A byte is filled up with ones; webcams add bytes of zeros.
+    """
     place, word, held, spare = _filled(coded, place, word, held, spare)
-    return bool(spare > 0 and held - spare < 8)
+    word <<= np.uint64((held - spare) & 7)
+    while spare == 0 and word == 0:
+        place, word, held, spare = _filled(coded, place, word, 0, 0)
+    return place if word == 0 else -1
 
 
 @njit(cache=True)

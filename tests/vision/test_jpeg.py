@@ -39,10 +39,12 @@ def test_whole_files_are_whole(kind):
     assert not is_damaged(saved(**kind))
 
 
-def test_fill_bytes_before_a_marker_are_allowed():
+@pytest.mark.parametrize("padding", [b"\xff\xff", b"\0", b"\0" * 200])
+def test_padding_before_a_marker_is_allowed(padding):
     data = saved()
     assert data.endswith(b"\xff\xd9")
-    assert not is_damaged(data[:-2] + b"\xff\xff\xff\xd9")
+    assert not is_damaged(data[:-2] + padding + b"\xff\xd9")
+    assert is_damaged(data[:-2] + b"\x12\x34" + padding + b"\xff\xd9")
 
 
 @pytest.mark.parametrize("kind", KINDS[:6], ids=str)
