@@ -107,7 +107,7 @@ def _extract(
     binary = binarise(photo.grey, invert=invert)
     if binary is None:
         return _empty(photo)
-    candidate = _choose(binary, clamp)
+    binary, candidate = _find(photo, binary, invert, clamp)
     sign = -1.0 if binary.inverted else 1.0
     start = start_curve(
         photo.grey, candidate.points_px, candidate.width_px, sign=sign,
@@ -137,6 +137,21 @@ def _empty(photo: Photo) -> Measurement:
     if float(photo.grey.max()) < 0.02:
         return failure("underexposed", "the picture is black all over; expose it more")
     return failure("no_rod", "nothing stands out from the background")
+
+
+def _find(
+    photo: Photo, binary: Binary, invert: bool | None, clamp: Clamp
+) -> tuple[Binary, Candidate]:
+    """Return the rod and its mask; glints make grey paper look like a dark board."""
+    try:
+        return binary, _choose(binary, clamp)
+    except LostError as lost:
+        if lost.flag != "no_rod" or invert is not None or not binary.inverted:
+            raise
+        dark = binarise(photo.grey, invert=False)
+        if dark is None:
+            raise
+        return dark, _choose(dark, clamp)
 
 
 def _choose(binary: Binary, clamp: Clamp) -> Candidate:

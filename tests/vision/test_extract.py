@@ -97,6 +97,18 @@ def test_turning_and_mirroring_the_picture_changes_nothing_but_the_sign():
     assert plain.tip_mm[1] > 0.0
 
 
+def test_glints_do_not_turn_grey_paper_into_a_dark_board():
+    frame = draw(curve("arc", angle_deg=70.0), np.random.default_rng(0))
+    light = 0.45 * as_photo(frame.image).grey
+    plain = extract(as_photo(light), None)
+    width = light.shape[1]
+    cv2.circle(light, (width - 100, 100), 60, 0.95, -1)
+    glinting = extract(as_photo(light), None)
+    assert glinting.ok, glinting.reason
+    assert glinting.length_px == pytest.approx(plain.length_px, abs=0.05)
+    assert not extract(as_photo(light), None, invert=True).ok
+
+
 def test_inverted_frames_measure_the_same():
     one = frame("arc", 60.0, 2)
     light = as_photo(one.image).grey

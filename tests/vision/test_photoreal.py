@@ -21,7 +21,7 @@ def camera(name: str) -> Calibration:
     return calibrate(read_photo(path), board=Board())
 
 
-@pytest.mark.parametrize("name", ["C", "D"])
+@pytest.mark.parametrize("name", ["C", "D", "I"])
 def test_one_board_tells_a_tilted_camera_with_a_barrel_lens(name):
     path = FOLDER / f"camera_{name.lower()}" / f"calib_{name}.json"
     truth = json.loads(path.read_text())["camera"]
@@ -65,3 +65,20 @@ def test_hard_photographs_are_measured(name, rms_px, rms_mm, tip_mm):
     xy = np.column_stack([result.points["x_mm"], result.points["y_mm"]])
     assert np.sqrt(np.mean(signed_distance(xy, line) ** 2)) < rms_mm
     assert np.hypot(*np.subtract(result.tip_mm, line[-1])) < tip_mm
+
+
+def test_glints_of_a_steel_clamp_on_grey_paper_do_not_hide_the_rod():
+    """They are farther above the paper than the rod is below: no dark board, though."""
+    place = FOLDER / "camera_i"
+    truth = json.loads((place / "ph_I07.json").read_text())
+    result = extract(
+        read_photo(place / "ph_I07.jpg"), camera("I"),
+        rod_height_mm=truth["axis_height_mm"],
+    )  # fmt: skip
+    assert result.ok, result.reason
+    true_px = np.array(truth["centreline_px"])
+    assert np.abs(signed_distance(result.points_px, true_px)).max() < 0.4
+    assert result.width_mm == pytest.approx(truth["side_mm"], abs=0.022)
+    line = np.array(truth["centreline_mm"])
+    xy = np.column_stack([result.points["x_mm"], result.points["y_mm"]])
+    assert np.sqrt(np.mean(signed_distance(xy, line) ** 2)) < 0.05
