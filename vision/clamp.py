@@ -121,6 +121,7 @@ def _face(
     place = _steepest(light, -s[::-1], -expected, reach, 0.12 * contrast)
     if np.isnan(place):
         return None
+    place = _end_of_dark(light, -s[::-1], place, 0.12 * contrast)
     crossing = crossings_of(light, -s[::-1], place, near, 3.0, 4.0, reach=4.0)
     line = line_through(across, crossing)
     if line is None:
@@ -178,3 +179,28 @@ def _steepest(
             if rise > best:
                 best, place = rise, centre
     return place
+
+
+@njit(cache=True)
+def _end_of_dark(light: Array, s: Array, place: float, least: float) -> float:
+    """Return where lanes leave the dark of the rod, at or before their steepest rise.
+
+    Between rod and clamp may lie the clamp's face, lighter than the one and darker than
+    the other, so that its top edge is the steeper rise.
+    """
+    lag = int(3.0 / STEP_PX)
+    mean = np.zeros(s.size)
+    for i in range(len(light)):
+        mean += light[i] / len(light)
+    steepest = int((place - s[0]) / STEP_PX)
+    dark = np.nanmin(mean[: steepest + 1])
+    k = steepest
+    while k > 0 and mean[k] > dark + 0.5 * least:
+        k -= 1
+    if k + 2 * lag >= steepest:
+        return place
+    best, end = 0.0, place
+    for j in range(max(k - lag, 0), k + lag):
+        if mean[j + lag] - mean[j] > best:
+            best, end = mean[j + lag] - mean[j], 0.5 * (s[j] + s[j + lag])
+    return end

@@ -1,0 +1,38 @@
+"""The line at a clamp where the dark of the rod ends."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from magbend.vision.clamp import find_clamp
+from magbend.vision.curve import Curve
+
+ROD, PAPER, TOP = 0.03, 0.6, 0.3
+
+
+def clamped(face: float, depth: float) -> tuple[np.ndarray, Curve]:
+    """A rod along x that leaves the face of a clamp at x = 60, `depth` px deep."""
+    x, y = np.meshgrid(np.arange(200.0), np.arange(120.0))
+    into = 1.0 / (1.0 + np.exp((x - 60.0) / 0.6))
+    deeper = 1.0 / (1.0 + np.exp((x - 60.0 + depth) / 0.6))
+    rod = 1.0 / (1.0 + np.exp((np.abs(y - 60.0) - 10.0) / 0.6))
+    light = PAPER + (ROD - PAPER) * rod
+    light += (face - light) * into
+    light += (TOP - light) * deeper
+    s = np.linspace(0.0, 120.0, 121)
+    points = np.column_stack([65.0 + s, np.full(121, 60.0)])
+    return light.astype(np.float32), Curve(
+        s=s, points=points, theta=np.zeros(121), kappa=np.zeros(121)
+    )
+
+
+@pytest.mark.parametrize(("face", "depth"), [(0.1, 12.0), (0.13, 7.0), (0.3, 9.0)])
+def test_rod_ends_where_its_dark_ends_not_at_the_top_edge_of_the_face(face, depth):
+    grey, curve = clamped(face, depth)
+    lines = find_clamp(
+        grey, curve, expected=-5.0, width=20.0, blur=1.0, contrast=PAPER - ROD,
+        reach=20.0,
+    )  # fmt: skip
+    assert lines.face is not None
+    assert lines.face.s == pytest.approx(-5.0, abs=0.3)
