@@ -72,9 +72,8 @@ def _to_end_of_face(tip: EndFace, state: State, seen: Seen, walls: Walls) -> End
     wall = np.maximum(wall, 0.0)
     top = np.array([median(seen.edges.inner[seen.good])])
     away = 2.0 * np.abs(gap) + 0.5 * wall
-    level, mirrors = np.zeros(1), np.full(1, MIRRORED)
-    paper = top + tip.rise
-    light = wall_light(wall, away, state.width, top, paper, level, mirrors, SKY)
+    paper, level = top + tip.rise, np.zeros(1)
+    light = wall_light(wall, away, state.width, top, paper, level, MIRRORED, SKY)
     blur = math.sqrt(2.0) * state.blur
     short = short_of_end(wall, light, blur, float(wall[0]), 1.0)
     return replace(tip, s=tip.s + float(short[0]))

@@ -131,7 +131,7 @@ def _pass(
     tip, lines, first = find_ends(grey, state, seen, root, sign, turn, walls)
     clamped = root == "clamp"
     if walls is not None:
-        seen = to_wall_ends(state, seen, first, walls, clamped=clamped)
+        seen = to_wall_ends(state, seen, walls)
     fit, used = _fit(state, seen, first, tip.s, joints, turn, clamped=clamped)
     at = fit.curve.s + first
     smooth, sigma = _smooth_width(seen, at, state.width)

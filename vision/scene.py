@@ -422,7 +422,7 @@ def _draw_rod(picture: Picture, scene: Scene, camera: Calibration) -> None:
 
 
 def _mirroring(scene: Scene, camera: Calibration) -> Picture:
-    """Return the reflectance of the rod's walls: Fresnel's, halved beside the clamp."""
+    """Return the reflectance of the rod's walls, by Fresnel's formula."""
     size = camera.image_size_px
     out = np.zeros(size[::-1], dtype=np.float32)
     line, pose = scene.centreline, scene.clamp.pose
@@ -435,7 +435,7 @@ def _mirroring(scene: Scene, camera: Calibration) -> Picture:
     across = camera.to_px(beside, height_mm=pose.height_mm) - at
     rise = camera.to_px(axis, height_mm=pose.height_mm + 1.0) - at
     steep = np.abs(np.sum(rise * across, axis=1)) / np.sum(across**2, axis=1)
-    value = reflectance(steep) * (1.0 - 0.5 * np.exp(-line.s_mm / scene.side_mm))
+    value = reflectance(steep)
     thick = math.ceil(4.0 * scene.side_mm * float(np.hypot(*across.T).max()))
     pixels = np.round(at).astype(int)
     for k in range(len(pixels) - 1, 0, -1):

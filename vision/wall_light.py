@@ -36,9 +36,6 @@ REFRACTION = 1.45
 """Refractive index of rubbers (silicone 1.41, natural rubber 1.52)."""
 SKY = 0.5
 """Diffuse light of a wall, over that of the top: half the sky."""
-CLAMP = 0.25
-"""What of the mirrored light the clamp takes beside it: it fills half of what a rough
-wall mirrors there, and a width on next to nothing."""
 WALL_PLACES = 25
 _MOST_SLOPE = 0.5
 """Shade is carried on to the mirrored paper as a line, by this share of it at most."""
@@ -46,9 +43,7 @@ _LEAST, _MOST = -0.3, 0.6
 """Light of a wall above the top's, over the paper's above the top's."""
 
 
-def to_wall_ends(
-    state: State, seen: Seen, first: float, walls: Walls, *, clamped: bool
-) -> Seen:
+def to_wall_ends(state: State, seen: Seen, walls: Walls) -> Seen:
     """Move edges from half level to where the side walls end, which are lighter.
 
     And find out anew which are of use, now that the width less the walls is one.
@@ -61,9 +56,7 @@ def to_wall_ends(
         edges.outer_high, edges.shade_low, edges.shade_high,
     )  # fmt: skip
     wide, away = np.abs(wall), 2.0 * np.abs(gap) + 0.5 * np.abs(wall)
-    beside = np.exp(-np.maximum(places - first, 0.0) / width)
-    mirrors = MIRRORED * (1.0 - CLAMP * beside * float(clamped))
-    light = wall_light(wide, away, width, top, paper, slope, mirrors, SKY)
+    light = wall_light(wide, away, width, top, paper, slope, MIRRORED, SKY)
     close, _, window = level_spans(state.blur, state.fuzz)
     short = short_of_end(wide, light, state.blur, close, window)
     low, high = edges.low.copy(), edges.high.copy()
@@ -75,7 +68,7 @@ def to_wall_ends(
 @njit(cache=True)
 def wall_light(
     wall: Array, away: Array, width: float, top: Array, paper: Array, slope: Array,
-    mirrors: Array, sky: float,
+    mirrored: float, sky: float,
 ) -> Array:  # fmt: skip
     """Return the light of walls above the top's, over the paper's above the top's.
 
@@ -89,17 +82,17 @@ def wall_light(
     top, paper, slope : ndarray, shape (n,)
         Light of the rod's top and of the paper beside the wall, and the rise of the
         latter outwards, per px. NaN gives 0.
-    mirrors : ndarray, shape (n,)
+    mirrored : float
         What a wall mirrors, over what Fresnel's formula gives.
     sky : float
         Its own light over the top's.
     """
     light = np.zeros_like(wall)
-    share = mirrors * reflectance(wall / np.maximum(width - wall, 1.0))
+    share = mirrored * reflectance(wall / np.maximum(width - wall, 1.0))
     for i in range(wall.size):
         within = _MOST_SLOPE * abs(paper[i])
-        mirrored = paper[i] + min(max(slope[i] * away[i], -within), within)
-        above = share[i] * mirrored + sky * top[i] - top[i]
+        facing = paper[i] + min(max(slope[i] * away[i], -within), within)
+        above = share[i] * facing + sky * top[i] - top[i]
         above /= max(paper[i] - top[i], 0.1 * abs(paper[i]) + 1e-6)
         if not np.isnan(above):
             light[i] = min(max(above, _LEAST), _MOST)
