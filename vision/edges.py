@@ -90,11 +90,16 @@ class Edges:
         variance = (median(rise) / _ROOT_2PI) ** 2 - _SLOPE_VARIANCE
         return math.sqrt(max(variance, 0.01))
 
-    def usable(self, walls: Array | float = 0.0) -> NDArray[np.bool_]:
-        """Stations with both edges, of a width like the others' but for side walls."""
+    def usable(
+        self, walls: Array | float = 0.0, *, least: float = 0.6
+    ) -> NDArray[np.bool_]:
+        """Stations with both edges, of a width like the others' but for side walls.
+
+        Those whose width is within `least` px of the median are of use in any case.
+        """
         width = self.width - walls
         away = np.abs(width - median(width))
-        return np.asarray(away < max(5.0 * 1.4826 * median(away), 0.6))
+        return np.asarray(away < max(5.0 * 1.4826 * median(away), least))
 
     def shaded(self, blur: float) -> Array:
         """Half the difference of what the paper's slope does to either edge, px."""

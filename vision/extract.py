@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 import cv2
@@ -20,9 +21,10 @@ from .refine import refine
 from .rod import LEAST_SHARE, Candidate, find_candidates
 from .specimen_frame import Setting, measurement
 from .state import LostError
-from .track import start_curve
+from .track import Start, start_curve
 
 Array = NDArray[np.float64]
+Image = NDArray[np.float32]
 Clamp = Literal["auto", "none"]
 
 _BROKEN = (
@@ -35,6 +37,10 @@ _PALER = 0.25
 
 LEAST_LENGTH = 0.08
 """Shortest rod, in diagonals of the picture: below that it is dust, hair or print."""
+
+
+SMOOTH = 0.12
+"""Blur for a rough rod, in widths: its two edges do not feel each other yet."""
 
 
 def extract(
@@ -109,26 +115,36 @@ def _extract(
         return _empty(photo)
     binary, candidate = _find(photo, binary, invert, clamp)
     sign = -1.0 if binary.inverted else 1.0
-    start = start_curve(
-        photo.grey, candidate.points_px, candidate.width_px, sign=sign,
-        follow=candidate.root == "clamp",
-    )  # fmt: skip
-    if start is None:
-        raise LostError("edges_lost", "the rod has no two edges against the paper")
-
+    grey, start = photo.grey, _start(photo.grey, candidate, sign)
+    if start.rough:
+        # Strands, gaps and hairs blurred away, what is left is how much is rod.
+        blur = SMOOTH * start.width
+        grey = np.asarray(cv2.GaussianBlur(grey, (0, 0), blur))
+        soft = _start(grey, candidate, sign, blur)
+        start = replace(soft, rough=True, width=start.width)
     calibrated = setting.calibration is not None
 
     def joints(curve: Curve) -> Sequence[float]:
         return setting.joints_px(curve)
 
     refined = refine(
-        photo.grey, start, root=candidate.root, sign=sign, joints=joints,
+        grey, start, root=candidate.root, sign=sign, joints=joints,
         walls=setting.walls_px if calibrated and not binary.inverted else None,
         face_px=setting.face_px(start.curve),
     )  # fmt: skip
     refusal(photo, refined, candidate)
     result = measurement(refined, candidate, setting)
     return doubts(result, photo, refined, candidate, setting)
+
+
+def _start(grey: Image, candidate: Candidate, sign: float, blur: float = 1.0) -> Start:
+    start = start_curve(
+        grey, candidate.points_px, candidate.width_px, sign=sign,
+        follow=candidate.root == "clamp", blur=blur,
+    )  # fmt: skip
+    if start is None:
+        raise LostError("edges_lost", "the rod has no two edges against the paper")
+    return start
 
 
 def _empty(photo: Photo) -> Measurement:

@@ -82,7 +82,8 @@ def doubts(
         flags.append("overexposed")
     if quantile(refined.shaded[refined.good], 0.9) > SHADE_PX:
         flags.append("shadow")
-    if refined.good.mean() < 0.8 or refined.fit.noise > 0.02 * result.width_px:
+    unsure = refined.good.mean() < 0.8 or refined.fit.noise > 0.02 * result.width_px
+    if refined.rough or unsure:
         flags.append("rough_edges")
     if refined.tip.scatter > 0.5 or abs(refined.tip.skew) > 0.2:
         flags.append("ragged_tip")

@@ -21,7 +21,7 @@ from .rod import Root
 from .spline import Smooth
 from .state import LostError, Seen, State
 from .tip import EndFace
-from .track import Start
+from .track import FLARED, Start
 from .wall_light import Walls, to_wall_ends
 
 Array = NDArray[np.float64]
@@ -59,6 +59,8 @@ class Refined:
         The free end; s counts as in `fit`.
     clamp : ClampLines or None
         Lines at the clamp; None for a rod that enters at the border or floats.
+    rough : bool
+        Whether its edges wander, as a yarn's.
     """
 
     fit: CurveFit
@@ -68,6 +70,7 @@ class Refined:
     sigma_width: Array
     tip: EndFace
     clamp: ClampLines | None
+    rough: bool
 
     @property
     def typical_width(self) -> float:
@@ -112,7 +115,9 @@ def refine(
     """
     half = np.full(len(start.curve.s), 0.5 * start.width)
     last = float(start.curve.s[-1])
-    state = State(start.curve, half, start.width, 0.0, last, face_px)
+    state = State(
+        start.curve, half, start.width, 0.0, last, face_px, start.rough, start.blur
+    )
     for turn in range(_PASSES):
         length = state.last
         result, first = _pass(grey, state, root, sign, joints, walls, turn)
@@ -141,7 +146,7 @@ def _pass(
     return Refined(
         fit=fit, shaded=shaded, good=used, width=smooth, sigma_width=sigma,
         tip=replace(tip, s=tip.s - first),
-        clamp=None if lines is None else lines.shifted(first),
+        clamp=None if lines is None else lines.shifted(first), rough=state.rough,
     ), first  # fmt: skip
 
 
@@ -166,7 +171,7 @@ def _look(grey: Image, state: State, sign: float, turn: int) -> Seen:
         grey, points, normals, -half, half,
         reach=reach, blur=state.blur, fuzz=fuzz, sign=sign, smooth=int(6.0 / step),
     )  # fmt: skip
-    good = edges.usable()
+    good = edges.usable(least=FLARED * width if state.rough else 0.6)
     if good.sum() < max(8.0, 0.4 * len(good)):
         raise LostError(
             "edges_lost",
@@ -211,7 +216,7 @@ def _fit(
     )
     # Supple while the rod is sought, then stiff enough not to follow shade; the path
     # of a rough rod (yarn) is no elastica, and stays supple.
-    supple = turn < _ROUGH_PASSES or state.scatter > 0.03 * width
+    supple = turn < _ROUGH_PASSES or state.rough or state.scatter > 0.03 * width
     places = joints(state.curve)
     if not supple and not places:
         places = find_joints(

@@ -38,6 +38,7 @@ class State:
     first: float
     last: float
     face_px: float
+    rough: bool
     blur: float = 1.0
     scatter: float = 0.0
     fuzz: float = 0.0

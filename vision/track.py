@@ -34,6 +34,12 @@ _UNSEEN = 8
 _AS_LIGHT = 0.7
 """Light of paper beyond what hid an edge, over that before it; a clamp is darker."""
 
+FLARED = 0.6
+"""How much a rough rod may widen or thin, as where its end opens, in widths."""
+ROUGH_PX, ROUGH_WIDTHS = 0.7, 0.03
+"""A rod is rough if its width jumps by more, on the average over steps of 3 px: by 0.9
+to 2.2 px and over 0.033 widths on yarns, by 0.6 px on smooth rods in noise of 6 %."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
@@ -45,15 +51,22 @@ class Start:
         From near the clamp to near the tip.
     width : float
         Width of the rod, px.
+    rough : bool
+        Whether its edges wander as no noise makes them: those of a yarn or a rope.
+    blur : float
+        As was given.
     """
 
     curve: Curve
     width: float
+    rough: bool
+    blur: float
 
 
 def start_curve(
-    grey: Image, points: Array, width: float, *, sign: float, follow: bool
-) -> Start | None:
+    grey: Image, points: Array, width: float, *, sign: float, follow: bool,
+    blur: float = 1.0,
+) -> Start | None:  # fmt: skip
     """Centre a rough curve between its edges and carry it towards the clamp.
 
     Parameters
@@ -68,6 +81,8 @@ def start_curve(
         -1 for a light rod.
     follow : bool
         Whether to carry the curve on at the root; at the tip it always is.
+    blur : float
+        Standard deviation of the picture's blur, px: where paper is looked for.
 
     Returns
     -------
@@ -77,22 +92,46 @@ def start_curve(
     s, along, theta = _resample(points, 0.6 * width)
     normals = np.column_stack([-np.sin(theta), np.cos(theta)])
     low, high, dark, level = rough_edges(
-        grey, along, normals, reach=0.5 * width + 6.0, sign=sign
+        grey, along, normals, reach=0.5 * width + 4.0 + 2.0 * blur, sign=sign
     )
     across = high - low
     found = np.isfinite(across) & (across > 1.0)
     if found.sum() < 0.5 * len(across):
         return None
     real = median(across[found])
-    good = found & (np.abs(across - real) < 0.3 * real + 1.0)
+    rough = blur > 1.0
+    alike = FLARED * real if rough else 0.3 * real + 1.0
+    good = found & (np.abs(across - real) < alike)
     if good.sum() < 0.5 * len(across):
         return None
     centre = along + (0.5 * (low + high))[:, None] * normals
-    centres = centre[good][:: max(1, round(0.4 * real / s[1]))]
+    centres = centre[good]
+    if rough:  # a polyline that wanders is too long
+        centres = _means(centres, max(1, round(real / s[1])))
+    else:
+        centres = centres[:: max(1, round(0.4 * real / s[1]))]
     if follow:
-        centres = _follow(grey, centres[2:], real, sign, dark, level)
-    centres = _follow(grey, centres[::-1], real, sign, dark, level)[::-1]
-    return Start(curve=smooth_curve(centres, spacing=2.0 * real), width=real)
+        centres = _follow(grey, centres[2:], real, sign, dark, level, blur)
+    centres = _follow(grey, centres[::-1], real, sign, dark, level, blur)[::-1]
+    return Start(
+        curve=smooth_curve(centres, spacing=2.0 * real),
+        width=real,
+        rough=_is_rough(across[found], real),
+        blur=blur,
+    )
+
+
+def _means(points: Array, count: int) -> Array:
+    """Return the means of so many points each; the last ones of those that are left."""
+    first = np.arange(0, len(points), count)
+    size = np.diff(np.append(first, len(points)))
+    return np.asarray(np.add.reduceat(points, first) / size[:, None])
+
+
+def _is_rough(across: Array, width: float) -> bool:
+    """Whether the width jumps from station to station, but for lost edges."""
+    jump = float(np.minimum(np.abs(np.diff(across)), 0.3 * width).mean())
+    return jump > max(ROUGH_PX, ROUGH_WIDTHS * width)
 
 
 def smooth_curve(points: Array, *, spacing: float) -> Curve:
@@ -132,21 +171,27 @@ def _resample(points: Array, window: float) -> tuple[Array, Array, Array]:
 
 
 def _follow(
-    grey: Image, centres: Array, width: float, sign: float, dark: float, level: float
+    grey: Image,
+    centres: Array,
+    width: float,
+    sign: float,
+    dark: float,
+    level: float,
+    blur: float,
 ) -> Array:
     """Carry centres on at the root end, at most seven widths."""
     step = max(2.0, 0.25 * width)
     room = int(7.0 * width / step) + 1
     path = np.zeros((room + min(len(centres), _RECENT), 2))
     path[room:] = centres[:_RECENT]
-    head = _carry_on(grey, path, room, width, step, sign, dark, level)
+    head = _carry_on(grey, path, room, width, step, sign, dark, level, blur)
     return np.concatenate([path[head:room], centres])
 
 
 @njit(cache=True)
 def _carry_on(
     grey: Image, path: Array, head: int, width: float, step: float, sign: float,
-    dark: float, level: float,
+    dark: float, level: float, blur: float,
 ) -> int:  # fmt: skip
     """Fill the path before `head` while there are two edges; return its new head.
 
@@ -156,7 +201,7 @@ def _carry_on(
     seen, unseen, again, light = head, 0, 0, level - dark
     while head > 0 and len(path) - head >= 4 and unseen <= _UNSEEN:
         x, y, u, v = _predict(path[head : head + _RECENT], step)
-        beside = 0.5 * width + 4.0
+        beside = 0.5 * width + 2.0 + 2.0 * blur
         shade = min(
             sign * _streak(grey, x - beside * v, y + beside * u, u, v),
             sign * _streak(grey, x + beside * v, y - beside * u, u, v),
