@@ -201,6 +201,27 @@ def test_yarns_are_measured_from_the_border_to_the_tip(name, root, tip):
     assert np.hypot(*np.subtract(result.tip_px, tip)) < 35.0
 
 
+@pytest.mark.parametrize("name", ["acrylic_20_1", "acrylic_25_1"])
+def test_trifles_do_not_move_what_is_measured_of_a_yarn(name):
+    image = cv2.imread(str(FIXTURES / "yarn" / f"{name}.jpg"))
+    plain = extract(as_photo(image), None)
+    brighter = np.clip(np.rint(1.01 * image), 0, 255).astype(np.uint8)
+    _, packed = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 90])
+    again = cv2.imdecode(packed, cv2.IMREAD_COLOR)
+    for changed, shift in (
+        (image[:, :-1], 0),
+        (image[1:], 1),
+        (brighter, 0),
+        (again, 0),
+    ):
+        other = extract(as_photo(np.ascontiguousarray(changed)), None)
+        assert other.ok
+        away = np.subtract(other.tip_px, plain.tip_px) + np.array([0, shift])
+        assert np.hypot(*away) < 4.0
+        assert other.width_px == pytest.approx(plain.width_px, rel=0.03)
+        assert other.length_px == pytest.approx(plain.length_px, rel=0.003)
+
+
 def scene(colour, heading, angle, **options):
     camera = scene_camera(
         **{"tilt_deg": 5.0, "distortion": (-0.2, 0, 0, 0, 0), **options}
