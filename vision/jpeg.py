@@ -126,7 +126,7 @@ def _walk(
             )
             if held < spare:
                 return False
-    return _marker(coded, place, word, held, spare) >= 0
+    return bool(_marker(coded, place, word, held, spare) >= 0)
 
 
 @njit(cache=True)

@@ -353,12 +353,12 @@ def _contact(both: Mask) -> tuple[Mask, int]:
     if w == 0:
         return both, 0
     # Far fewer pixels than the whole, and a frame for them to grow into.
-    small = cv2.copyMakeBorder(
-        both[y : y + h, x : x + w], 2, 2, 2, 2, cv2.BORDER_CONSTANT
-    )
+    box = (slice(y, y + h), slice(x, x + w))
+    small = np.zeros((h + 4, w + 4), np.uint8)
+    small[2:-2, 2:-2] = both[box]
     count, labels = cv2.connectedComponents(_grown(small))
     first = np.zeros_like(both)
-    first[y : y + h, x : x + w] = both[y : y + h, x : x + w] & (labels[2:-2, 2:-2] == 1)
+    first[box] = both[box] & (labels[2:-2, 2:-2] == 1)
     return first, count - 1
 
 

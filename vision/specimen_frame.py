@@ -259,7 +259,7 @@ def _root(refined: Refined, ends: LocalView, setting: Setting, side_mm: float) -
         apart = seen_at[1] - seen_at[0]
         return seen_at[is_face(apart, setting.face_px(refined.fit.curve))]
     if len(seen_at) == 2:
-        return between(*seen_at, refined.clamp)
+        return between(seen_at[0], seen_at[1], refined.clamp)
     return seen_at[0] if seen_at else 0.0
 
 
