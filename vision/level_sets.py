@@ -17,11 +17,38 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 
 
+_OPENINGS = 0.5, 0.35
+"""Discs that hairs are thinner than, in half widths of the thing."""
+_REACHED = 0.5
+"""Part of a thing that is reached from its root, at least."""
+
+
 def level_sets(piece: Mask, seeds: Mask | None, half: float) -> Array | None:
     """Return the centres of the geodesic level sets, shape (n, 2), root to tip."""
+    for opening in _OPENINGS:
+        distance = _from_root(piece, seeds, half, opening)
+        if np.count_nonzero(distance >= 0.0) > _REACHED * cv2.countNonZero(piece):
+            break  # else it cut the thing in two, at a gap in a yarn
+    step = max(1.0, half)
+    top = float(distance.max())
+    if top < 4.0 * step:
+        return None
+    sums = np.zeros((int(top / step) + 1, 3))
+    _sum_sets(distance, step, sums)
+    count = sums[:, 0]
+    if np.any(count == 0):
+        return None
+    curve = sums[:, 1:] / count[:, None]
+    return curve[:-1] if count[-1] < 0.5 * median(count) else curve
+
+
+def _from_root(
+    piece: Mask, seeds: Mask | None, half: float, opening: float
+) -> NDArray[np.float32]:
+    """Return the distance from the root inside a thing without its hairs, else -1."""
     smooth = piece
     if half >= 3.0:
-        size = 2 * int(0.5 * half) + 1
+        size = 2 * int(opening * half) + 1
         kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
         smooth = np.asarray(cv2.morphologyEx(piece, cv2.MORPH_OPEN, kernel), np.uint8)
         if seeds is not None:
@@ -34,18 +61,7 @@ def level_sets(piece: Mask, seeds: Mask | None, half: float) -> Array | None:
         distance = _geodesic(smooth, far)
         seeds = np.zeros_like(smooth)
         seeds.flat[int(np.argmax(distance))] = 1
-    distance = _geodesic(smooth, np.ascontiguousarray(seeds & smooth))
-    step = max(1.0, half)
-    top = float(distance.max())
-    if top < 4.0 * step:
-        return None
-    sums = np.zeros((int(top / step) + 1, 3))
-    _sum_sets(distance, step, sums)
-    count = sums[:, 0]
-    if np.any(count == 0):
-        return None
-    curve = sums[:, 1:] / count[:, None]
-    return curve[:-1] if count[-1] < 0.5 * median(count) else curve
+    return np.asarray(_geodesic(smooth, np.ascontiguousarray(seeds & smooth)))
 
 
 @njit(cache=True)
