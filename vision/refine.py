@@ -104,7 +104,8 @@ def refine(
         Arc lengths in px, from the root, of joints on a given curve.
     walls : callable, optional
         How wide the side walls are seen at points and angles of the axis, for a given
-        width of the rod, px; positive where seen on the left.
+        width of the rod, px, and the gap between them and the paper; positive where
+        seen on the left.
     face_px : float
         How much of a clamp's face the camera may see, along the rod.
 
