@@ -139,7 +139,7 @@ def _front(
     contrast: float, reach: float, sign: float, fine: bool,
 ) -> EndFace | None:  # fmt: skip
     near = max(1.5, 2.2 * blur)
-    beside = _BESIDE * width + near + 3.0
+    beside = (_BESIDE if fine else _BESIDE[::2]) * width + near + 3.0
     crossings: list[Array] = []
     offsets: list[Array] = []
     seen: list[Array] = []

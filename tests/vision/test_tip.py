@@ -1,0 +1,91 @@
+"""The step that tells tip and clamp: no bias, near the Cramer-Rao bound."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import erf
+
+from magbend.vision import as_photo, extract
+from magbend.vision.clamp import ClampLines, between
+from magbend.vision.score import signed_distance
+from magbend.vision.synthetic import CLEAN, curve, draw
+from magbend.vision.tip import EndFace, crossings_of, fit_step, line_through
+
+S = np.arange(-16.0, 16.0, 0.5)
+ACROSS = np.linspace(-6.0, 6.0, 13)
+LOW, HIGH, BLUR = 0.1, 0.8, 1.1
+LINE = EndFace(s=0.0, sigma=0.0, skew=0.0, scatter=0.0, found=1.0)
+
+
+def lanes_over(place, skew, *, slope=0.0, noise=0.0, rng=None):
+    """Blurred steps; the paper's light changes by `slope` per px behind them."""
+    t = S[None] - place - skew * ACROSS[:, None]
+    step = 0.5 * (1.0 + erf(t / BLUR / np.sqrt(2.0)))
+    bell = BLUR * np.exp(-0.5 * (t / BLUR) ** 2) / np.sqrt(2.0 * np.pi)
+    light = LOW + (HIGH - LOW) * step + slope * (t * step + bell)
+    return light if rng is None else light + noise * rng.standard_normal(light.shape)
+
+
+def fitted(light):
+    crossing = crossings_of(light, S, 0.0, 2.4, 10.0, 4.0, reach=6.0)
+    line = line_through(ACROSS, crossing)
+    return fit_step(light, S, ACROSS, line, crossing, blur=BLUR, inner=10.0, outer=6.0)
+
+
+@pytest.mark.parametrize("slope", [-0.02, 0.0, 0.02])
+@pytest.mark.parametrize("skew", [-0.15, 0.0, 0.1])
+def test_step_on_shade_is_found_without_bias(slope, skew):
+    for place in (-0.4, 0.0, 0.3):
+        face = fitted(lanes_over(place, skew, slope=slope))
+        assert face.s == pytest.approx(place, abs=0.003)
+        assert face.skew == pytest.approx(skew, abs=0.002)
+        assert face.rise == pytest.approx(HIGH - LOW, abs=0.01)
+
+
+def test_step_scatters_as_the_bound_allows():
+    noise, rng = 0.02, np.random.default_rng(4)
+    found = [fitted(lanes_over(0.2, 0.0, noise=noise, rng=rng)).s for _ in range(200)]
+    near = (S > 0.2 - 10.0) & (S < 0.2 + 6.0)
+    t = (S[near] - 0.2) / BLUR
+    step = 0.5 * (1.0 + erf(t / np.sqrt(2.0)))
+    bell = np.exp(-0.5 * t**2) / np.sqrt(2.0 * np.pi)
+    # Place, two levels and the outer one's slope, from all lanes together.
+    design = np.column_stack(
+        [-(HIGH - LOW) / BLUR * bell, 1.0 - step, step, t * step + bell]
+    )
+    inverse = np.linalg.inv(len(ACROSS) * design.T @ design)
+    bound = noise * np.sqrt(inverse[0, 0])
+    assert np.std(found) < 1.2 * bound
+    assert abs(np.mean(found) - 0.2) < 4.0 * bound / np.sqrt(len(found))
+
+
+def test_lane_with_a_speck_at_the_end_counts_for_nothing():
+    light = lanes_over(0.0, 0.0)
+    light[4] = np.where(np.abs(S - 2.0) < 2.5, LOW, light[4])
+    assert fitted(light).s == pytest.approx(0.0, abs=0.01)
+
+
+def test_lines_at_the_clamp_weigh_as_their_steps_squared():
+    lines = ClampLines(face=replace(LINE, rise=0.1), front=replace(LINE, rise=0.3))
+    assert between(1.0, 2.0, lines) == pytest.approx(1.9)
+    unknown = ClampLines(face=LINE, front=LINE)
+    assert between(1.0, 2.0, unknown) == pytest.approx(1.5)
+
+
+def test_blur_does_not_pull_a_bent_rod_to_its_inner_side():
+    light = replace(CLEAN, blur_px=1.6, noise=0.0005)
+    inwards = []
+    for seed, angle in enumerate((-200.0, 200.0)):
+        one = draw(
+            curve("arc", length_mm=24.0, angle_deg=angle), np.random.default_rng(seed),
+            px_per_mm=18.0, light=light, size_px=(760, 760), clamp_height_mm=6.0,
+        )  # fmt: skip
+        result = extract(as_photo(one.image), one.truth.calibration)
+        off = signed_distance(result.points_px, one.truth.points_px)[10:-10]
+        inwards.append(-np.sign(angle) * off.mean())
+    radius = 24.0 * 18.0 / np.radians(200.0)
+    pull = (1.6**2 + 0.25) / (2.0 * radius)
+    assert abs(np.mean(inwards)) < 0.3 * pull
