@@ -75,7 +75,8 @@ class FitResult:
         Sum of squared residuals over degrees of freedom; above 1, the standard
         deviations are widened by its root.
     nuisance : tuple of dict
-        name, of (run or step), value, sd, prior_sd of each nuisance parameter.
+        name, of (run or step; the first of those that share a clamp), value, sd,
+        prior_sd of each nuisance parameter.
     residual_mm : tuple of (label, s_mm, residual_mm, sd_mm)
         What is left across the line, step by step.
     specimen : Specimen

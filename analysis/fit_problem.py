@@ -46,8 +46,9 @@ class Shot:
 
     Attributes
     ----------
-    run, step : int
-        Index of the run and of the shot in the problem.
+    run, step, frame : int
+        Index in the problem of the run, of the shot, and of the first shot whose
+        photograph has the same clamp direction, and so the same error of it.
     normals : ndarray, shape (n, 2)
         Unit normals of the measured line, to its left.
     sigma_mm : ndarray, shape (n,)
@@ -63,6 +64,7 @@ class Shot:
 
     run: int
     step: int
+    frame: int
     label: str
     specimen: Specimen
     field: sim.UniformField | sim.MagnetField
@@ -72,6 +74,11 @@ class Shot:
     sd_mm: Array
     frame_sd_deg: float
     remanence_per_mm: float
+
+    def holder(self, nuisance: str) -> int:
+        """Return the index of what a nuisance of this shot belongs to."""
+        own = {"clamp_position_mm": self.step, "frame_angle_deg": self.frame}
+        return own.get(nuisance, self.run)
 
     @property
     def spacing_mm(self) -> float:
@@ -167,6 +174,7 @@ def build_problem(
     support = support or common_support(runs)
     _check(runs, free, nuisance, support)
     shots: list[Shot] = []
+    frames: dict[tuple[int, str], int] = {}
     skipped: list[str] = []
     magnet_sd: list[float] = []
     for index, run in enumerate(runs):
@@ -175,11 +183,16 @@ def build_problem(
         magnet_sd.append(math.hypot(100.0 * relative, nuisance.magnet_percent))
         slope = _remanence_per_mm(run)
         for step in run.steps:
-            shot = _shot(run, step, (index, len(shots)), model, magnet, slope)
+            seen = run.frame(step)
+            clamp = (index, seen.shared_clamp if seen else "")
+            first = frames.get(clamp, len(shots))
+            shot = _shot(run, step, (index, len(shots), first), model, magnet, slope)
             if isinstance(shot, str):
                 skipped.append(f"{run.label}, step {step.index}: {shot}")
             else:
                 shots.append(shot)
+                if clamp[1]:
+                    frames[clamp] = first
     if not shots:
         raise StoreError(f"no step can be fitted; the first: {skipped[0]}")
     if "magnet_remanence_T" in free:
@@ -271,7 +284,7 @@ def _remanence_per_mm(run: RunData) -> float:
 
 
 def _shot(
-    run: RunData, step: Step, indices: tuple[int, int], model: str,
+    run: RunData, step: Step, indices: tuple[int, int, int], model: str,
     magnet: Magnet | None, remanence_per_mm: float,
 ) -> Shot | str:  # fmt: skip
     frame = run.frame(step)
@@ -289,6 +302,7 @@ def _shot(
     return Shot(
         run=indices[0],
         step=indices[1],
+        frame=indices[2],
         label=f"{run.label}, step {step.index}",
         specimen=run.specimen,
         field=field,
@@ -331,5 +345,6 @@ def _nuisances(
             add("gap_mm", index, nuisance.gap_mm)
     for shot in shots:
         add("clamp_position_mm", shot.step, nuisance.clamp_position_mm)
-        add("frame_angle_deg", shot.step, nuisance.frame_sd_deg(shot.frame_sd_deg))
+        if shot.frame == shot.step:
+            add("frame_angle_deg", shot.frame, nuisance.frame_sd_deg(shot.frame_sd_deg))
     return nuisances, sds

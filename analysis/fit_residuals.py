@@ -17,7 +17,6 @@ from .. import sim
 from ..core.specimen import Specimen
 from .fit_problem import Problem, Shot
 from .metrics import position_at
-from .nuisance import PER_SHOT
 
 Array = NDArray[np.float64]
 
@@ -118,7 +117,7 @@ def _values(problem: Problem, shot: Shot, unknowns: Array) -> dict[str, float]:
     }
     scaled = unknowns[len(problem.names) :] * problem.nuisance_sd
     for (name, index), value in zip(problem.nuisances, scaled, strict=True):
-        if index == (shot.step if name in PER_SHOT else shot.run):
+        if index == shot.holder(name):
             values[name] = float(value)
     return values
 
@@ -226,7 +225,7 @@ def _derivatives(
         slope = seen[name] * values[name] if name.startswith("E_MPa") else load
         jacobian[:, k] = -_across(shot, slope)
     for k, (name, index) in enumerate(problem.nuisances):
-        if index == (shot.step if name in PER_SHOT else shot.run):
+        if index == shot.holder(name):
             column = _across(shot, columns[name]()) * problem.nuisance_sd[k]
             jacobian[:, len(problem.names) + k] = -column
     return jacobian

@@ -74,6 +74,9 @@ class Frame:
         NaN where the table does not say.
     pose : Pose or None
         Where the specimen frame lies in the board frame.
+    shared_clamp : str
+        The run whose photographs gave the direction together, and share its error;
+        empty where the photograph has its own.
     """
 
     image: str
@@ -86,6 +89,7 @@ class Frame:
     width_mm: float
     clamp_angle_sd_deg: float
     pose: Pose | None
+    shared_clamp: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -450,6 +454,7 @@ def _frame(path: Path, row: Mapping[Any, Any], table: pd.DataFrame | None) -> Fr
         width_mm=_number(row.get("width_mm")),
         clamp_angle_sd_deg=_number(row.get("clamp_angle_sd_deg")),
         pose=_pose(row),
+        shared_clamp=_text(row.get("shared_clamp")),
     )
 
 

@@ -23,8 +23,8 @@ class Nuisance:
     clamp_position_mm : float
         Place of the measured frame across the rod, of a photograph.
     frame_angle_deg : float or None
-        Direction of the measured frame, of a photograph. None takes what each
-        photograph states itself (``clamp_angle_sd_deg`` of ``frames.csv``).
+        Direction of the measured frame, of a photograph, or of all that share a clamp.
+        None takes what each states itself (``clamp_angle_sd_deg`` of ``frames.csv``).
     scale_percent : float
         Millimetres per pixel, of a run.
     magnet_percent : float
@@ -69,4 +69,3 @@ class Nuisance:
 
 
 NUISANCE_NAMES = tuple(field.name for field in fields(Nuisance))
-PER_SHOT = ("clamp_position_mm", "frame_angle_deg")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from ..vision.batch import Settings
     from ..vision.board import Board
     from ..vision.calibration import Calibration
+    from ..vision.tables import FrameRow
 
 app = group(
     "vision",
@@ -178,6 +180,11 @@ def extract(
     bare: Path = typer.Option(
         None, "--bare", help="The paper alone, to divide the light out."
     ),
+    shared_clamp: bool = typer.Option(
+        None, "--shared-clamp/--own-clamps",
+        help="One clamp in all photographs: they give its direction together; "
+        "default: those of a run or a video do.",
+    ),
     edges: Path = typer.Option(
         None, "--edges", help="Write the side-edge points too (CSV)."
     ),
@@ -234,6 +241,7 @@ def extract(
             edges=edges,
             workers=workers or _workers(len(sources)),
             resume=resume,
+            shared_clamp=shared_clamp,
             progress=report,
         )
     if figure_steps is not None:
@@ -431,6 +439,28 @@ def _workers(pictures: int) -> int:
     return 1 if pictures < 60 else max(1, os.cpu_count() or 1)
 
 
+_TOLD_ONCE = ("uncalibrated", "clamp_moved")
+
+
+def _tell_clamps(frames: Sequence[FrameRow]) -> None:
+    """Say which photographs share a clamp, and which should and do not."""
+    shared = {frame.shared_clamp: frame.clamp_angle_sd_deg for frame in frames}
+    for run, sd_deg in shared.items():
+        if run:
+            count = sum(frame.shared_clamp == run for frame in frames)
+            typer.echo(
+                f"{run}: {count} photographs share one clamp, its direction is known "
+                f"to {sd_deg:.2f} deg"
+            )
+    moved = sum("clamp_moved" in frame.flags for frame in frames)
+    if moved:
+        typer.echo(
+            f"clamp_moved: {moved} photographs of one clamp disagree on its place or "
+            "direction; each keeps its own",
+            err=True,
+        )
+
+
 def _tell_frames(result: Any, *, json_output: bool) -> None:
     if json_output:
         print_json(
@@ -447,6 +477,8 @@ def _tell_frames(result: Any, *, json_output: bool) -> None:
                         "tip_mm": frame.tip_mm,
                         "tip_angle_deg": frame.tip_angle_deg,
                         "width_mm": frame.width_mm,
+                        "clamp_angle_sd_deg": frame.clamp_angle_sd_deg,
+                        "shared_clamp": frame.shared_clamp,
                         "reason": frame.reason,
                     }
                     for frame in result.frames
@@ -457,8 +489,9 @@ def _tell_frames(result: Any, *, json_output: bool) -> None:
     for frame in result.frames:
         if not frame.ok:
             typer.echo(f"{frame.image}: failed: {frame.reason}", err=True)
-        elif set(frame.flags) - {"uncalibrated"}:
-            typer.echo(f"{frame.image}: {', '.join(frame.flags)}", err=True)
+        elif doubts := [f for f in frame.flags if f not in _TOLD_ONCE]:
+            typer.echo(f"{frame.image}: {', '.join(doubts)}", err=True)
+    _tell_clamps(result.frames)
     typer.echo(
         f"{result.out}: {result.measured} of {len(result.frames)} photographs measured"
     )

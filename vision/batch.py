@@ -9,6 +9,7 @@ import math
 import multiprocessing
 import os
 import signal
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -21,16 +22,17 @@ import cv2
 import numpy as np
 
 from ..core.errors import MagbendError, VisionError
-from ..core.files import write_bytes
+from ..core.files import output_file, output_folder, write_bytes
 from ..core.progress import Progress, silent
 from . import tables
-from .batch_state import Done, State
+from .batch_state import State
 from .calibration import Calibration
 from .extract import extract
 from .inputs import Source, digest, list_sources, read_source
 from .measurement import Measurement, failure
 from .overlay import overlay_png
 from .photo import Photo, read_photo
+from .tables import Done
 
 _log = logging.getLogger(__name__)
 
@@ -145,6 +147,7 @@ def extract_files(
     edges: Path | None = None,
     workers: int = 1,
     resume: bool = False,
+    shared_clamp: bool | None = None,
     progress: Progress = silent,
 ) -> BatchResult:
     """Measure photographs and write ``centrelines.csv``, ``frames.csv`` and overlays.
@@ -166,6 +169,10 @@ def extract_files(
         ``if __name__ == "__main__":``, as everywhere in Python.
     resume : bool
         Keep what an earlier call with the same settings measured of unchanged files.
+    shared_clamp : bool or None
+        Whether one clamp holds the rod in all photographs, so that they give its
+        direction together (`shared_clamp.shared_direction`). None: in those of a run,
+        and in the frames of a video. It needs a calibration.
     progress : callable
         Called as ``progress(done, total)``.
 
@@ -174,14 +181,17 @@ def extract_files(
     VisionError
         If a path is missing, or nothing could be measured (the tables, which say why,
         are written all the same).
+    InputError
+        If nothing can be written where `out` and `edges` say.
     """
     sources = list_sources(paths)
-    out.mkdir(parents=True, exist_ok=True)
+    output_folder(out / "overlays" if overlays else out)
     if edges is not None:
-        edges.parent.mkdir(parents=True, exist_ok=True)
-    if overlays:
-        (out / "overlays").mkdir(exist_ok=True)
-    state = State(out, edges, settings.fingerprint(), [s.image for s in sources])
+        output_file(edges)
+    state = State(
+        out, edges, settings.fingerprint(), [source.image for source in sources],
+        _runs(sources, shared_clamp=shared_clamp),
+    )  # fmt: skip
     if resume:
         state.load(sources)
     todo = [source for source in sources if source.image not in state.done]
@@ -202,6 +212,21 @@ def extract_files(
             f"{first.image}: {first.reason.removeprefix(f'{first.image}: ')}"
         )
     return BatchResult(out=out, frames=frames)
+
+
+def _runs(sources: list[Source], *, shared_clamp: bool | None) -> dict[str, str]:
+    """Return by image the name of the run that it shares a clamp with."""
+    if shared_clamp is False:
+        return {}
+    loose = "photographs" if shared_clamp else ""
+    names = Counter(run.name for run in {source.run for source in sources} if run)
+
+    def name(run: Path | None) -> str:
+        if run is None:
+            return loose
+        return run.name if names[run.name] == 1 else str(run)
+
+    return {source.image: name(source.run) for source in sources}
 
 
 @dataclass(frozen=True, slots=True)

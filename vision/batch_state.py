@@ -5,36 +5,33 @@ from __future__ import annotations
 import csv
 import json
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 
 from ..core.files import write_text
 from . import tables
 from .inputs import Source, digest
+from .run_frame import in_own_frame, in_run_frames
+from .tables import Done
 
 STATE_FILE = "extract.json"
+_SCHEMA = 2
 _CHECKPOINT_S = 20.0
 
 
-@dataclass(frozen=True, slots=True)
-class Done:
-    """The text that one photograph adds to the tables."""
-
-    image: str
-    sha256: str
-    frame: str
-    centreline: str
-    edges: str
-
-
 class State:
-    """The tables so far; written whole from time to time, and at the end."""
+    """The tables so far; written whole from time to time, and at the end.
+
+    `done` holds every photograph in its own frame; the tables have those of a run
+    (`runs`, by image) in the frame of its one clamp.
+    """
 
     def __init__(
-        self, out: Path, edges: Path | None, settings: str, order: list[str]
-    ) -> None:
+        self, out: Path, edges: Path | None, settings: str, order: list[str],
+        runs: Mapping[str, str],
+    ) -> None:  # fmt: skip
         self._out, self._edges, self._settings = out, edges, settings
-        self._order = order
+        self._order, self._runs = order, runs
         self._next_write = time.monotonic() + _CHECKPOINT_S
         self.done: dict[str, Done] = {}
 
@@ -49,7 +46,10 @@ class State:
 
     def write(self) -> None:
         """Write all tables; the state goes last and names only what they hold."""
-        ready = [self.done[image] for image in self._order if image in self.done]
+        ready = in_run_frames(
+            (self.done[image] for image in self._order if image in self.done),
+            self._runs,
+        )
         write_text(
             self._out / "centrelines.csv",
             tables.header(tables.CENTRELINE_HEADER)
@@ -66,7 +66,7 @@ class State:
                 + "".join(done.edges for done in ready),
             )
         state = {
-            "schema": 1,
+            "schema": _SCHEMA,
             "settings_sha256": self._settings,
             "edges": self._edges is not None,
             "images": {done.image: done.sha256 for done in ready},
@@ -78,24 +78,29 @@ class State:
         try:
             state = json.loads((self._out / STATE_FILE).read_text(encoding="utf-8"))
             images = dict(state["images"])
-            if state["settings_sha256"] != self._settings:
+            if (state["schema"], state["settings_sha256"]) != (_SCHEMA, self._settings):
                 return
             if self._edges is not None and not state["edges"]:
                 return
             frames = _lines_by_image(self._out / "frames.csv")
             centrelines = _lines_by_image(self._out / "centrelines.csv")
             edges = {} if self._edges is None else _lines_by_image(self._edges)
+            held = {
+                name: in_own_frame(
+                    Done(
+                        name, sha256, frames[name],
+                        centrelines.get(name, ""), edges.get(name, ""),
+                    )
+                )
+                for name, sha256 in images.items()
+                if sha256 and name in frames
+            }  # fmt: skip
         except (OSError, ValueError, KeyError, TypeError):
             return
         for source in sources:
-            name = source.image
-            if name in frames and source.path.exists():
-                sha256 = images.get(name)
-                if sha256 and sha256 == digest(source):
-                    self.done[name] = Done(
-                        name, sha256, frames[name],
-                        centrelines.get(name, ""), edges.get(name, ""),
-                    )  # fmt: skip
+            done = held.get(source.image)
+            if done and source.path.exists() and done.sha256 == digest(source):
+                self.done[source.image] = done
 
 
 def _lines_by_image(path: Path) -> dict[str, str]:

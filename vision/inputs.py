@@ -34,12 +34,15 @@ class Source:
         Number of the frame in a video.
     overlay : str
         Name of its overlay.
+    run : Path or None
+        The run or video it belongs to, which has one clamp; None if loose.
     """
 
     image: str
     path: Path
     frame: int | None = None
     overlay: str = ""
+    run: Path | None = None
 
 
 def list_sources(paths: Iterable[Path]) -> list[Source]:
@@ -88,7 +91,8 @@ def _of_folder(folder: Path) -> list[Source]:
     )
     if not found:
         raise VisionError(f"{within}: this folder has no photographs")
-    return [Source(image=path.name, path=path) for path in found]
+    run = folder.resolve() if is_run else None
+    return [Source(image=path.name, path=path, run=run) for path in found]
 
 
 def _of_video(path: Path) -> list[Source]:
@@ -100,7 +104,7 @@ def _of_video(path: Path) -> list[Source]:
     if count <= 0:
         return [Source(image=path.name, path=path, frame=0)]  # fails in its row
     return [
-        Source(image=f"{path.stem}_{frame:06d}", path=path, frame=frame)
+        Source(image=f"{path.stem}_{frame:06d}", path=path, frame=frame, run=path)
         for frame in range(count)
     ]
 

@@ -76,7 +76,7 @@ def doubts(
         flags.append("root_hidden")
     if candidate.root == "clamp" and _goes_on(photo, refined):
         flags.append("clamp_doubtful")
-    if np.radians(result.clamp_angle_sd_deg) * result.length_mm > TURN_MM:
+    if direction_is_doubtful(result.clamp_angle_sd_deg, result.length_mm):
         flags.append("direction_doubtful")
     if photo.clipped > 0.01:
         flags.append("overexposed")
@@ -100,6 +100,11 @@ def _scale_sd(camera: Calibration, rod_height_mm: float) -> float:
         return 0.0
     height = camera.camera_height_mm
     return abs(rod_height_mm) * camera.camera_height_sd_mm / height**2
+
+
+def direction_is_doubtful(sd_deg: float, length_mm: float) -> bool:
+    """Whether the direction at the clamp may move the tip by more than `TURN_MM`."""
+    return bool(np.radians(sd_deg) * length_mm > TURN_MM)
 
 
 def _goes_on(photo: Photo, refined: Refined) -> bool:

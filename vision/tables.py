@@ -24,14 +24,30 @@ FRAME_HEADER = (
     "image", "status", "flags", "length_mm", "tip_x_mm", "tip_y_mm", "tip_angle_deg",
     "width_mm", "clamp_x_px", "clamp_y_px", "tip_x_px", "tip_y_px", "clamp_x_mm",
     "clamp_y_mm", "clamp_angle_deg", "rod_height_mm", "reason",
-    "clamp_angle_sd_deg",
+    "clamp_angle_sd_deg", "own_angle_deg", "own_angle_sd_deg", "shared_clamp",
 )  # fmt: skip
 EDGE_HEADER = ("image", "side", "point", "x_px", "y_px", "x_mm", "y_mm")
 
 
+@dataclass(frozen=True, slots=True)
+class Done:
+    """The text that one photograph adds to the tables."""
+
+    image: str
+    sha256: str
+    frame: str
+    centreline: str
+    edges: str
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrameRow:
-    """One row of ``frames.csv``; lengths in mm, NaN where there is none."""
+    """One row of ``frames.csv``; lengths in mm, NaN where there is none.
+
+    The direction of `pose`, known to `clamp_angle_sd_deg`, is that of `shared_clamp`,
+    the run or video whose photographs give it together; where that is empty it is the
+    photograph's own, ``own_angle_deg``, which stays in the table.
+    """
 
     image: str
     status: str
@@ -44,6 +60,10 @@ class FrameRow:
     tip_px: tuple[float, float]
     pose: Pose | None
     reason: str
+    clamp_angle_sd_deg: float = math.nan
+    own_angle_deg: float = math.nan
+    own_angle_sd_deg: float = math.nan
+    shared_clamp: str = ""
 
     @property
     def ok(self) -> bool:
@@ -62,12 +82,12 @@ def frame_row(image: str, measurement: Measurement) -> str:
             for value in (pose.x_mm, pose.y_mm, pose.angle_deg, pose.height_mm)
         )
     )
-    return _row(
+    sd = number(m.clamp_angle_sd_deg)
+    return row(
         image, m.status, ";".join(m.flags), number(m.length_mm), number(m.tip_mm[0]),
         number(m.tip_mm[1]), number(m.tip_angle_deg), number(m.width_mm),
         number(m.clamp_px[0]), number(m.clamp_px[1]), number(m.tip_px[0]),
-        number(m.tip_px[1]), *placed, " ".join(m.reason.split()),
-        number(m.clamp_angle_sd_deg),
+        number(m.tip_px[1]), *placed, " ".join(m.reason.split()), sd, placed[2], sd, "",
     )  # fmt: skip
 
 
@@ -76,7 +96,7 @@ def centreline_rows(image: str, measurement: Measurement) -> str:
     if not measurement.ok:
         return ""
     columns = [measurement.points[name] for name in POINT_COLUMNS]
-    name = _row(image).rstrip("\n")
+    name = row(image).rstrip("\n")
     lines = [
         f"{name},{','.join(number(value) for value in values[:-1])},{values[-1]:.0f}"
         for values in zip(*columns, strict=True)
@@ -99,7 +119,7 @@ def edge_rows(
         Gives the edges in mm in the specimen frame, at the height of the rod's axis.
     """
     points, pose = measurement.points, measurement.pose
-    name, lines = _row(image).rstrip("\n"), []
+    name, lines = row(image).rstrip("\n"), []
     for side in ("left", "right"):
         if f"{side}_x_px" not in points:
             return ""
@@ -109,8 +129,8 @@ def edge_rows(
             mm = pose.from_board(calibration.to_mm(px, height_mm=pose.height_mm))
         for index, values in enumerate(np.column_stack([px, mm])):
             if np.all(np.isfinite(values[:2])):
-                row = ",".join(number(value) for value in values)
-                lines.append(f"{name},{side},{index},{row}\n")
+                cells = ",".join(number(value) for value in values)
+                lines.append(f"{name},{side},{index},{cells}\n")
     return "".join(lines)
 
 
@@ -119,10 +139,38 @@ def number(value: float) -> str:
     return f"{value:.10g}" if math.isfinite(value) else ""
 
 
-def _row(*cells: str) -> str:
+def row(*cells: str) -> str:
+    """Return one line of a table, with its end."""
     buffer = io.StringIO()
     csv.writer(buffer, lineterminator="\n").writerow(cells)
     return buffer.getvalue()
+
+
+def turned(table: str, header: tuple[str, ...], turn_rad: float) -> str:
+    """Return lines of a table in a specimen frame that is turned about its origin.
+
+    Parameters
+    ----------
+    table : str
+        Lines of ``centrelines.csv`` or of the edge table, without the header.
+    header : tuple of str
+        Their columns.
+    turn_rad : float
+        How far the new frame is turned, counter-clockwise.
+    """
+    x, y = header.index("x_mm"), header.index("y_mm")
+    theta = header.index("theta_rad") if "theta_rad" in header else None
+    c, s = math.cos(turn_rad), math.sin(turn_rad)
+    lines = []
+    for cells in csv.reader(io.StringIO(table)):
+        if cells[x]:
+            old_x, old_y = float(cells[x]), float(cells[y])
+            cells[x] = number(c * old_x + s * old_y)
+            cells[y] = number(c * old_y - s * old_x)
+            if theta is not None:
+                cells[theta] = number(float(cells[theta]) - turn_rad)
+        lines.append(row(*cells))
+    return "".join(lines)
 
 
 def header(names: Iterable[str]) -> str:
@@ -138,7 +186,7 @@ def read_frames(path: Path) -> list[FrameRow]:
     ConfigError
         If the file is missing, lacks a column or holds something else than numbers.
     """
-    return [_frame(path, row) for row in _rows(path, FRAME_HEADER[:12])]
+    return [_frame(path, cells) for cells in _rows(path, FRAME_HEADER[:12])]
 
 
 def read_centrelines(path: Path) -> dict[str, dict[str, Array]]:
@@ -155,9 +203,9 @@ def read_centrelines(path: Path) -> dict[str, dict[str, Array]]:
         If the file is missing, lacks a column or holds something else than numbers.
     """
     cells: dict[str, list[list[float]]] = {}
-    for row in _rows(path, CENTRELINE_HEADER):
-        values = [_float(path, row, name) for name in POINT_COLUMNS]
-        cells.setdefault(row["image"], []).append(values)
+    for line in _rows(path, CENTRELINE_HEADER):
+        values = [_float(path, line, name) for name in POINT_COLUMNS]
+        cells.setdefault(line["image"], []).append(values)
     return {
         image: dict(zip(POINT_COLUMNS, np.array(values).T, strict=True))
         for image, values in cells.items()
@@ -191,12 +239,12 @@ def _rows(path: Path, needed: Iterable[str]) -> list[dict[str, str]]:
     return list(reader)
 
 
-def _frame(path: Path, row: dict[str, str]) -> FrameRow:
+def _frame(path: Path, cells: dict[str, str]) -> FrameRow:
     def value(name: str) -> float:
-        return _float(path, row, name)
+        return _float(path, cells, name)
 
     pose = None
-    if row.get("clamp_angle_deg"):
+    if cells.get("clamp_angle_deg"):
         pose = Pose(
             x_mm=value("clamp_x_mm"),
             y_mm=value("clamp_y_mm"),
@@ -204,9 +252,9 @@ def _frame(path: Path, row: dict[str, str]) -> FrameRow:
             height_mm=value("rod_height_mm"),
         )
     return FrameRow(
-        image=row["image"],
-        status=row["status"],
-        flags=tuple(flag for flag in row["flags"].split(";") if flag),
+        image=cells["image"],
+        status=cells["status"],
+        flags=tuple(flag for flag in cells["flags"].split(";") if flag),
         length_mm=value("length_mm"),
         tip_mm=(value("tip_x_mm"), value("tip_y_mm")),
         tip_angle_deg=value("tip_angle_deg"),
@@ -214,12 +262,16 @@ def _frame(path: Path, row: dict[str, str]) -> FrameRow:
         clamp_px=(value("clamp_x_px"), value("clamp_y_px")),
         tip_px=(value("tip_x_px"), value("tip_y_px")),
         pose=pose,
-        reason=row.get("reason") or "",
+        reason=cells.get("reason") or "",
+        clamp_angle_sd_deg=value("clamp_angle_sd_deg"),
+        own_angle_deg=value("own_angle_deg"),
+        own_angle_sd_deg=value("own_angle_sd_deg"),
+        shared_clamp=cells.get("shared_clamp") or "",
     )
 
 
-def _float(path: Path, row: dict[str, str], name: str) -> float:
-    text = row.get(name) or ""
+def _float(path: Path, cells: dict[str, str], name: str) -> float:
+    text = cells.get(name) or ""
     if not text:
         return math.nan
     try:

@@ -45,6 +45,7 @@ def write_run(
     end: bool = True,
     reach_mm: float = 1.0,
     clamp_angle_sd_deg: float = math.nan,
+    shared_clamp: str = "",
 ) -> Path:
     """Write a run folder whose true rod is `truth`, and return it.
 
@@ -85,6 +86,7 @@ def write_run(
         frames.append(_frame(name, truth, line.length_mm * scale, xy, theta))
         if math.isfinite(clamp_angle_sd_deg):
             frames[-1]["clamp_angle_sd_deg"] = clamp_angle_sd_deg
+        frames[-1]["shared_clamp"] = shared_clamp
         good = np.ones(points)
         rows.append(
             (

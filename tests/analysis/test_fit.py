@@ -115,6 +115,24 @@ def test_a_photograph_that_knows_its_direction_narrows_the_interval(
     assert sds[0] < sds[2] < sds[1]
 
 
+def test_photographs_that_share_a_clamp_share_its_error(tmp_path: Path) -> None:
+    own, one = (
+        build_problem(
+            [
+                load_run(write_run(tmp_path / f"{name}{shared}", shared_clamp=shared))
+                for name in "ab"
+            ]
+        )
+        for shared in ("", "run")
+    )
+    errors = [
+        [index for name, index in problem.nuisances if name == "frame_angle_deg"]
+        for problem in (own, one)
+    ]
+    shots = len(own.shots)
+    assert errors == [list(range(shots)), [0, shots // 2]], "one for each run"
+
+
 def test_a_magnet_that_stands_farther_than_stated_is_in_the_interval(
     tmp_path: Path,
 ) -> None:
@@ -183,10 +201,11 @@ def test_without_noise_the_moduli_are_exact(tmp_path: Path) -> None:
     assert fit.specimen.sections[0].E_MPa == fit.E_MPa[0]
 
 
-def test_jacobian_is_that_of_the_residuals(tmp_path: Path) -> None:
+@pytest.mark.parametrize("shared", ["", "run"])
+def test_jacobian_is_that_of_the_residuals(tmp_path: Path, shared: str) -> None:
     rod = replace(sim.gmc(2), density_kg_m3=2640.0)
     support = sim.Support(gravity_m_s2=(0.0, -9.81, 0.0))
-    path = write_run(tmp_path / "a", specimen=rod, support=support)
+    path = write_run(tmp_path / "a", specimen=rod, support=support, shared_clamp=shared)
     problem = build_problem(
         [load_run(path)],
         free=["remanence_mT", "load_factor", "magnet_remanence_T"],
