@@ -40,10 +40,13 @@ def find_ends(
     middle = median(edges.middle[near]) if near.any() and turn == 0 else 0.0
     end = seen.good & (seen.s > curve.s[-1] - 1.5 * width)
     taper = median(edges.width[end]) if end.sum() > 3 else width
-    tip = find_tip(
-        grey, curve, expected=state.last + outwards, width=min(width, taper),
-        blur=state.blur, reach=reach, middle=middle, sign=sign, fine=turn >= _FINE,
-    )  # fmt: skip
+    for far in (reach, 1.3 * width):  # the end of a taper may lie farther on
+        tip = find_tip(
+            grey, curve, expected=state.last + outwards, width=min(width, taper),
+            blur=state.blur, reach=far, middle=middle, sign=sign, fine=turn >= _FINE,
+        )  # fmt: skip
+        if tip is not None:
+            break
     if tip is None:
         raise LostError("no_tip", "the free end of the rod has no edge")
     if walls is not None and turn >= _FINE:
