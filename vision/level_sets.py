@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.jit import njit
+from .discs import opened
 from .robust import median
 
 Array = NDArray[np.float64]
@@ -48,9 +49,7 @@ def _from_root(
     """Return the distance from the root inside a thing without its hairs, else -1."""
     smooth = piece
     if half >= 3.0:
-        size = 2 * int(opening * half) + 1
-        kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
-        smooth = np.asarray(cv2.morphologyEx(piece, cv2.MORPH_OPEN, kernel), np.uint8)
+        smooth = opened(piece, int(opening * half))
         if seeds is not None:
             smooth = smooth | (piece & seeds)
     smooth = np.ascontiguousarray(smooth, dtype=np.uint8)

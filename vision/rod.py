@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..core.jit import njit
 from .binarise import Binary
+from .discs import near_core
 from .level_sets import level_sets
 from .robust import median
 
@@ -196,7 +197,7 @@ def _of_width(
 ) -> list[Candidate]:  # fmt: skip
     """Return the parts of a thing that are about `half` wide to either side."""
     reach = 1.5 * half + 1.0
-    fat = _near(depth, reach, reach + 1.0)
+    fat = near_core(depth, reach, reach + 1.0)
     thin = (roi > fat).view(np.uint8)
     parts, _ = cv2.findContours(thin, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     found = []
@@ -230,27 +231,6 @@ def _edge_distance(
     depth = np.zeros(roi.shape, np.float32)
     depth[inside] = cv2.distanceTransform(roi[inside], cv2.DIST_L2, 5)
     return depth
-
-
-@njit(cache=True)
-def _near(depth: NDArray[np.float32], core: float, reach: float) -> Mask:
-    """Mark what is within `reach` of where the depth exceeds `core`."""
-    height, width = depth.shape
-    near = np.zeros((height, width), np.uint8)
-    rows = int(reach)
-    aside = np.sqrt(reach**2 - np.arange(rows + 1) ** 2).astype(np.int64)
-    for i in range(height):
-        j = 0
-        while j < width:
-            first = j
-            while j < width and depth[i, j] > core:
-                j += 1
-            if j > first:
-                for k in range(max(i - rows, 0), min(i + rows + 1, height)):
-                    span = aside[abs(k - i)]
-                    near[k, max(first - span, 0) : j + span] = 1
-            j += 1
-    return near
 
 
 @njit(cache=True)
