@@ -74,7 +74,7 @@ def score(measurement: Measurement, truth: Truth) -> Score:
     return Score(
         rms_px=float(np.sqrt(np.mean(distance[inner] ** 2))),
         max_px=float(np.abs(distance[inner]).max()),
-        length_px=float(arc[-1] - truth.length_px),
+        length_px=measurement.length_px - truth.length_px,
         width_px=measurement.width_px - truth.width_px,
         tip_along_px=float(tip_error @ tangent),
         tip_across_px=float(tip_error @ left),
