@@ -2,7 +2,8 @@
 
 Skeletons end half a width early or fork into the corners. Here the curve is carried
 past the end; lanes along it, over the middle of the width, are crossed at half level
-between rod and paper, and a straight line through the crossings is the end face.
+between rod and paper, and a straight line goes through the crossings. A blurred step
+along such a line, fitted to all samples near it, is the end face.
 """
 
 from __future__ import annotations
