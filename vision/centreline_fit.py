@@ -22,24 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.jit import njit
-from .cholesky import factor, inverse, solved
+from .cholesky import factor, inverse, solved, squared
 from .curve import Curve
-from .likelihood import freedom_of, weighed_equations
-from .spline import (
-    Basis,
-    Smooth,
-    add_squares,
-    combined,
-    design,
-    knots_between,
-    penalty_on_moment,
-)
+from .likelihood import penalised
+from .problem import SHARED, Problem, linearised, moved, parameters, pose
+from .spline import Smooth, penalty_on_moment
 
 Array = NDArray[np.float64]
-
-SHARED = 8.0
-"""Stations 1 px apart that carry one station's worth of information: bilinear samples,
-compressed pictures and shade on the paper make neighbours alike."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,12 +47,12 @@ class CurveFit:
         Factor by which correlated residuals widen variances.
     freedom : float
         Effective number of parameters.
-    jacobian : ndarray, shape (n, p)
-        Change of the normal position by the parameters: origin, then coefficients.
-    basis : Basis
-        The splines whose coefficients give theta and kappa.
-    root : ndarray, shape (p, p)
-        Upper triangular matrix R with R R^T the covariance of the parameters.
+    problem : Problem
+        What was fitted.
+    change : ndarray, shape (p,)
+        The parameters.
+    covariance : ndarray, shape (p, p)
+        Their covariance.
     lever : ndarray, shape (n,)
         By how much a measured point turns the root, rad per px along its normal.
     """
@@ -73,27 +62,31 @@ class CurveFit:
     noise: float
     correlation: float
     freedom: float
-    jacobian: Array
-    basis: Basis
-    coefficients: Array
-    root: Array
+    problem: Problem
+    change: Array
+    covariance: Array
     lever: Array
 
     @property
     def sigma(self) -> Array:
         """Standard deviation of the normal position, shape (n,)."""
-        first = np.zeros(len(self.jacobian), np.int64)
-        return np.asarray(_deviation(first, self.jacobian, self.root))
+        jacobian = self.problem.jacobian
+        return self._deviation(np.zeros(len(jacobian), np.int64), jacobian)
 
     @property
     def sigma_theta(self) -> Array:
         """Standard deviation of theta, shape (n,)."""
-        return np.asarray(_deviation(self.basis.first + 1, self.basis.value, self.root))
+        basis = self.problem.basis
+        return self._deviation(basis.first + 1, basis.value)
 
     @property
     def sigma_kappa(self) -> Array:
         """Standard deviation of kappa, shape (n,)."""
-        return np.asarray(_deviation(self.basis.first + 1, self.basis.slope, self.root))
+        basis = self.problem.basis
+        return self._deviation(basis.first + 1, basis.slope)
+
+    def _deviation(self, first: NDArray[np.int64], rows: Array) -> Array:
+        return np.asarray(_deviation(first, rows, self.covariance))
 
     def turned(self, drift: Array, reach: float) -> float:
         """Return by how much errors that neighbours share turn the root.
@@ -125,16 +118,18 @@ def _shared_power(part: Array, kept: float) -> float:
 
 
 @njit(cache=True)
-def _deviation(first: NDArray[np.int64], rows: Array, root: Array) -> Array:
-    """Root of the diagonal of A R R^T A^T; a row of A holds `rows` from `first` on."""
+def _deviation(first: NDArray[np.int64], rows: Array, covariance: Array) -> Array:
+    """Root of the diagonal of A C A^T; a row of A holds `rows` from `first` on."""
     out = np.empty(first.size)
+    count = rows.shape[1]
     for i in range(first.size):
-        spread = np.zeros(root.shape[1])
-        for j in range(rows.shape[1]):
-            row = first[i] + j
-            for k in range(row, spread.size):  # R is upper triangular
-                spread[k] += rows[i, j] * root[row, k]
-        out[i] = np.sqrt(np.sum(spread**2))
+        power, start = 0.0, first[i]
+        for j in range(count):
+            pulled = 0.0
+            for k in range(count):
+                pulled += covariance[start + j, start + k] * rows[i, k]
+            power += rows[i, j] * pulled
+        out[i] = np.sqrt(max(power, 0.0))
     return out
 
 
@@ -186,35 +181,58 @@ def fit_curve(
     CurveFit
         With covariances.
     """
-    knots = knots_between(s[0], s[-1], spacing, joints)
-    basis, middle = design(knots, s), design(knots, 0.5 * (s[1:] + s[:-1]))
-    smooth = smooth or Smooth()
     if theta is None:
         theta = _chord_angles(points)
-    penalty, nullity = penalty_on_moment(knots, smooth, s, theta)
-    step = float(s[1] - s[0])
-    coefficients = _start(basis, theta, penalty * spacing ** (2 * smooth.order + 1))
-    start, *_ = _path(step, np.zeros(2), coefficients, basis, middle)
-    origin = np.mean((points - start)[weights > 0.0], axis=0)
-    for turn in range(iterations):
-        path, angle, rate, rate_mid = _path(step, origin, coefficients, basis, middle)
-        jacobian = _jacobian(step, rate, rate_mid, middle, len(coefficients))
-        strength, normal, right, pull = weighed_equations(
-            jacobian, _residual(points, path, rate, weights), weights, penalty,
-            coefficients, math.nan if stiffness is None else stiffness, shared, within,
-            nullity + 1, turn == iterations - 1,
-        )  # fmt: skip
-        half = factor(normal)
-        change = solved(half, right - strength * pull)
-        origin = origin + change[0] * np.array([-rate[0, 1], rate[0, 0]])
-        coefficients = coefficients + change[1:]
-    path, angle, rate, _ = _path(step, origin, coefficients, basis, middle)
-    curve = Curve(s=s, points=path, theta=angle, kappa=basis.slopes(coefficients))
-    root = inverse(half)
-    return _with_covariance(
-        curve, _residual(points, path, rate, weights), weights, within, shared,
-        jacobian, basis, coefficients, root, float(freedom_of(root, penalty, strength)),
+    problem = pose(
+        s, points, weights, theta, spacing=spacing, joints=joints, shared=shared,
+        within=within,
     )  # fmt: skip
+    smooth = smooth or Smooth()
+    strength = math.nan if stiffness is None else stiffness
+    for _ in range(iterations - 1):
+        fit = solve(problem, smooth, strength, last=False)
+        origin, coefficients = parameters(problem, fit.change)
+        problem = linearised(problem, origin, coefficients)
+    return solve(problem, smooth, strength)
+
+
+def solve(
+    problem: Problem, smooth: Smooth, strength: float = math.nan, *, last: bool = True
+) -> CurveFit:
+    """Fit a curve under a prior on the bending moment, in one step of Gauss-Newton.
+
+    Parameters
+    ----------
+    problem : Problem
+        The measured points, linearised.
+    smooth : Smooth
+        The prior.
+    strength : float, optional
+        Weight of the penalty; the most likely one if NaN.
+    last : bool
+        Whether it is the last step; before that, any fair weight will do.
+    """
+    penalty, nullity = penalty_on_moment(
+        problem.knots, smooth, problem.s, problem.theta
+    )
+    change, covariance, freedom = _solution(
+        problem, penalty, strength, nullity + 1, last
+    )
+    points, theta, kappa, residual = moved(problem, change)
+    noise, correlation = _scatter(problem, residual, freedom)
+    basis, start = problem.basis, problem.basis.first[0] + 1
+    turn = covariance[:, start : start + 4] @ basis.value[0]
+    return CurveFit(
+        curve=Curve(s=problem.s, points=points, theta=theta, kappa=kappa),
+        residual=residual,
+        noise=noise,
+        correlation=correlation,
+        freedom=freedom,
+        problem=problem,
+        change=change,
+        covariance=covariance * (noise**2 * correlation / problem.shared),
+        lever=problem.jacobian @ turn * problem.weight / problem.shared,
+    )
 
 
 def _chord_angles(points: Array) -> Array:
@@ -223,101 +241,31 @@ def _chord_angles(points: Array) -> Array:
 
 
 @njit(cache=True)
-def _start(basis: Basis, theta: Array, stiff: Array) -> Array:
-    """Return coefficients of a smooth curve through given angles."""
-    normal, right = 1e-3 * stiff, np.zeros(len(stiff))
-    add_squares(basis.first, basis.value, np.ones(theta.size), normal)
-    for j in range(right.size):
-        normal[j, j] += 1e-9
-    for i in range(theta.size):
-        for j in range(4):
-            right[basis.first[i] + j] += basis.value[i, j] * theta[i]
-    return np.asarray(solved(factor(normal), right))
+def _solution(
+    problem: Problem, penalty: Array, strength: float, free: int, last: bool
+) -> tuple[Array, Array, float]:
+    """Return the parameters, their covariance for unit noise, and how many count."""
+    total = np.sum(problem.weight * problem.residual**2) + problem.within
+    strength, normal, right = penalised(
+        problem.normal, problem.right, penalty, problem.coefficients, strength,
+        total / problem.shared, np.sum(problem.weight) / problem.shared, free, last,
+    )  # fmt: skip
+    half = factor(normal)
+    covariance = squared(inverse(half))
+    freedom = len(normal) - strength * np.sum(penalty * covariance[1:, 1:])
+    return solved(half, right), covariance, freedom
 
 
 @njit(cache=True)
-def _path(
-    step: float, origin: Array, coefficients: Array, basis: Basis, middle: Basis
-) -> tuple[Array, Array, Array, Array]:
-    """Return points by Simpson's rule, angles, unit tangents there and half way."""
-    theta = combined(basis.first, basis.value, coefficients)
-    mid = combined(middle.first, middle.value, coefficients)
-    points = np.empty((theta.size, 2))
-    rate, rate_mid = np.empty((theta.size, 2)), np.empty((mid.size, 2))
-    for i in range(theta.size):
-        rate[i, 0], rate[i, 1] = np.cos(theta[i]), np.sin(theta[i])
-    points[0] = origin
-    for i in range(mid.size):
-        rate_mid[i, 0], rate_mid[i, 1] = np.cos(mid[i]), np.sin(mid[i])
-        for k in range(2):
-            mean = (rate[i, k] + 4.0 * rate_mid[i, k] + rate[i + 1, k]) / 6.0
-            points[i + 1, k] = points[i, k] + step * mean
-    return points, theta, rate, rate_mid
-
-
-@njit(cache=True)
-def _residual(points: Array, path: Array, rate: Array, weight: Array) -> Array:
-    """Distance of the measured points along the normal; 0 where there is none."""
-    out = np.zeros(weight.size)
-    for i in range(weight.size):
-        if weight[i] > 0.0:
-            x, y = points[i, 0] - path[i, 0], points[i, 1] - path[i, 1]
-            out[i] = rate[i, 0] * y - rate[i, 1] * x
-    return out
-
-
-@njit(cache=True)
-def _jacobian(
-    step: float, rate: Array, rate_mid: Array, middle: Basis, count: int
-) -> Array:
-    """Change of the normal position by origin (along its normal) and coefficients."""
-    jacobian = np.zeros((len(rate), count + 1))
-    along = np.zeros((count, 2))
-    end = 0
-    for i in range(len(rate)):
-        x, y = rate[i, 0], rate[i, 1]
-        jacobian[i, 0] = x * rate[0, 0] + y * rate[0, 1]
-        for k in range(end):
-            jacobian[i, k + 1] = x * along[k, 1] - y * along[k, 0]
-        if i < len(rate_mid):
-            first = middle.first[i]
-            end = first + 4
-            for j in range(4):
-                along[first + j, 0] -= step * rate_mid[i, 1] * middle.value[i, j]
-                along[first + j, 1] += step * rate_mid[i, 0] * middle.value[i, j]
-    return jacobian
-
-
-def _with_covariance(
-    curve: Curve, residual: Array, weight: Array, within: float, shared: float,
-    jacobian: Array, basis: Basis, coefficients: Array, root: Array, freedom: float,
-) -> CurveFit:  # fmt: skip
-    """Widen the covariance by what the residuals of neighbours have in common."""
+def _scatter(problem: Problem, residual: Array, freedom: float) -> tuple[float, float]:
+    """Return the noise of a measurement and by how much its correlation widens."""
+    weight, within = problem.weight, problem.within
     used = weight > 0.0
-    count, between = float(weight.sum()), float(weight @ residual**2)
+    count, between = np.sum(weight), np.sum((weight * residual**2)[used])
     noise = np.sqrt((between + within) / max(count - freedom, 1.0))
-    each = count / max(int(np.count_nonzero(used)), 1)
+    each = count / max(float(np.sum(used)), 1.0)
     alike = _correlation(residual, used, max(round(24.0 / each), 6))
-    correlation = max(alike * each * between / max(between + within, 1e-300), 1.0)
-    return CurveFit(
-        curve=curve,
-        residual=np.where(used, residual, np.nan),
-        noise=float(noise),
-        correlation=correlation,
-        freedom=freedom,
-        jacobian=jacobian,
-        basis=basis,
-        coefficients=coefficients,
-        root=root * noise * np.sqrt(correlation / shared),
-        lever=_lever(jacobian, basis, root) * weight / shared,
-    )
-
-
-def _lever(jacobian: Array, basis: Basis, root: Array) -> Array:
-    """Return the change of theta at the root by points of unit weight."""
-    first = basis.first[0] + 1
-    turn = basis.value[0] @ root[first : first + 4]
-    return np.asarray(jacobian @ (root @ turn))
+    return noise, max(alike * each * between / max(between + within, 1e-300), 1.0)
 
 
 @njit(cache=True)

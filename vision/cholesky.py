@@ -65,3 +65,17 @@ def inverse(u: Array) -> Array:
             for i in range(j, size):
                 out[k, i] -= share * out[j, i]
     return out
+
+
+@njit(cache=True)
+def squared(u: Array) -> Array:
+    """Return U U^T of an upper triangular U."""
+    size = len(u)
+    out = np.empty_like(u)
+    for i in range(size):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(i, size):
+                total += u[i, k] * u[j, k]
+            out[i, j] = out[j, i] = total
+    return out

@@ -12,12 +12,13 @@ the weight of the penalty) grows by more than the choice among places explains.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core.jit import njit
+from .cholesky import factor, inverse
 
 Array = NDArray[np.float64]
 
@@ -37,19 +38,27 @@ _PRIOR = 0.05**2
 variance of a station: they are good to about a twentieth of a pixel."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Model:
-    """Linear model of the offsets: columns, their prior precision, and the data."""
+class _Model(NamedTuple):
+    """Linear model of the offsets, its smooth part on axes where it is diagonal."""
 
     s: Array
     angle: Array
     normals: Array
-    weight: Array
+    share: Array
+    """Weight of each station."""
     offset: Array
     smooth: Array
-    bend: Array
-    count: float
-    shared: float
+    """Columns of the smooth part on unit axes, times share: their squares add to 1."""
+    turned: Array
+    """The offsets on these axes."""
+    stiff: Array
+    """The penalty on each of these axes, at unit strength."""
+    volume: float
+    """Log determinant of the smooth part without penalty."""
+    power: float
+    """Sum of the squares of the smooth columns."""
+    size: float
+    total: float
 
 
 def find_joints(
@@ -88,7 +97,7 @@ def find_joints(
     choice = 2.0 * np.log(max(0.5 * (last - first) / width, 1.0))
     while len(joints) < _MOST:
         free = _free(places, joints, _APART * width)
-        alone, joined = _evidence(model, joints, free)
+        alone, joined = _evidence(model, np.array(joints), free)
         if not free.size or joined.max() - alone < _LEAST_GAIN + choice:
             break
         best = float(free[int(np.argmax(joined))])
@@ -112,40 +121,66 @@ def _settled(model: _Model, joints: list[float], step: float) -> list[float]:
             rest = joints[:k] + joints[k + 1 :]
             near = joints[k] + step * reach * np.linspace(-1.0, 1.0, 13)
             near = near[(near > 4.0 * step) & (near < model.s[-1] - 4.0 * step)]
-            _, joined = _evidence(model, rest, near)
+            _, joined = _evidence(model, np.array(rest), near)
             joints[k] = float(near[int(np.argmax(joined))])
     return joints
 
 
+@njit(cache=True)
 def _model(
     s: Array, theta: Array, offset: Array, weights: Array, shared: float
 ) -> _Model:
     """Thin the stations and set up the smooth part: quadratic plus hinges in theta."""
     thin = max(_THIN, len(s) // _MOST_STATIONS)
-    count = len(s) // thin * thin
-    weight = weights[:count].reshape(-1, thin).sum(axis=1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean = (offset * weights)[:count].reshape(-1, thin).sum(axis=1) / weight
-    at = s[:count].reshape(-1, thin).mean(axis=1)
-    angle = theta[:count].reshape(-1, thin).mean(axis=1)
-    normals = np.column_stack([-np.sin(angle), np.cos(angle)])
-    length = s[-1] - s[0]
-    u = (at - s[0]) / length
-    edges = np.linspace(0.0, 1.0, _PIECES + 1)
+    count = len(s) // thin
+    at, angle = np.zeros(count), np.zeros(count)
+    data, weight = np.zeros(count), np.zeros(count)
+    for i in range(count):
+        for k in range(i * thin, (i + 1) * thin):
+            at[i] += s[k] / thin
+            angle[i] += theta[k] / thin
+            if weights[k] > 0.0:
+                weight[i] += weights[k]
+                data[i] += weights[k] * offset[k]
+        if weight[i] > 0.0:
+            data[i] /= weight[i]
+    normals = np.column_stack((-np.sin(angle), np.cos(angle)))
     # theta as 1, u, u^2 and (u - edge)^3 over each piece: theta''' is constant there.
-    rise = np.clip(u[:, None] - edges[:-1], 0.0, None) ** 3
-    angles = np.column_stack([np.ones_like(u), u, u**2, rise])
-    smooth = np.column_stack([normals @ normals[0], _moved(angles, at, normals)])
-    # The third derivative of piece k is 6 times the sum of the first k coefficients.
-    sums = np.tril(np.ones((_PIECES, _PIECES)))
-    bend = np.zeros((smooth.shape[1],) * 2)
-    bend[4:, 4:] = sums.T @ sums
-    data = np.where(weight > 0.0, np.nan_to_num(mean), 0.0)
+    angles = np.empty((count, 3 + _PIECES))
+    for i in range(count):
+        u = (at[i] - s[0]) / (s[-1] - s[0])
+        angles[i, 0], angles[i, 1], angles[i, 2] = 1.0, u, u * u
+        for k in range(_PIECES):
+            angles[i, 3 + k] = max(u - k / _PIECES, 0.0) ** 3
+    smooth = np.empty((count, 4 + _PIECES))
+    smooth[:, 0] = normals @ normals[0]
+    smooth[:, 1:] = _moved(angles, at, normals)
     # Offsets count from a curve that is bent itself: give the model that curve too.
-    data = data + _moved(angle[:, None], at, normals)[:, 0]
+    data += _moved(angle.copy().reshape(-1, 1), at, normals)[:, 0]
+    # The third derivative of piece k is 6 times the sum of the first k coefficients.
+    bend = np.zeros((4 + _PIECES, 4 + _PIECES))
+    for j in range(_PIECES):
+        for k in range(_PIECES):
+            bend[4 + j, 4 + k] = _PIECES - max(j, k)
+    share = weight / shared
+    weighed = smooth * share.reshape(-1, 1)
+    normal = smooth.T @ weighed
+    power = np.trace(normal)
+    for j in range(len(normal)):
+        normal[j, j] += 1e-13 * power
+    # On axes V with V' normal V = 1 and V' bend V = diag(stiff), every strength costs a
+    # sum and no solve.
+    half = factor(normal)
+    unit = inverse(half)
+    stiff, turn = np.linalg.eigh(unit.T @ bend @ unit)
+    weighed = weighed @ (unit @ turn)
+    turned = weighed.T @ data
+    total = np.sum(share * data**2)
+    volume = 2.0 * np.sum(np.log(np.diag(half)))
     return _Model(
-        at, angle, normals, weight, data, smooth, bend, weight.sum() / shared, shared
-    )
+        at, angle, normals, share, data, weighed, turned, np.maximum(stiff, 0.0),
+        volume, power, np.sum(share), total,
+    )  # fmt: skip
 
 
 @njit(cache=True)
@@ -166,60 +201,91 @@ def _moved(angles: Array, s: Array, normals: Array) -> Array:
     return out
 
 
+@njit(cache=True)
 def _ramps(model: _Model, places: Array) -> Array:
     """Columns of a relative change of curvature beyond each place, (n, m)."""
-    turned = model.angle[:, None] - np.interp(places, model.s, model.angle)
-    beyond = np.where(model.s[:, None] > places, turned, 0.0)
+    at = np.interp(places, model.s, model.angle)
+    beyond = np.zeros((model.s.size, places.size))
+    for i in range(model.s.size):
+        for k in range(places.size):
+            if model.s[i] > places[k]:
+                beyond[i, k] = model.angle[i] - at[k]
     return np.asarray(_moved(beyond, model.s, model.normals))
 
 
-def _evidence(model: _Model, joints: list[float], places: Array) -> tuple[float, Array]:
-    """Return twice the log evidence of joints, and of one more at each place, (m,)."""
-    columns = model.smooth
-    if joints:
-        columns = np.column_stack([columns, _ramps(model, np.array(joints))])
-    weighted = columns * (model.weight / model.shared)[:, None]
-    normal, right = weighted.T @ columns, weighted.T @ model.offset
-    total = float(np.sum(model.weight * model.offset**2)) / model.shared
-    size, smooth = len(right), model.smooth.shape[1]
-    bend = np.zeros((size, size))
-    bend[:smooth, :smooth] = model.bend
-    tight = np.zeros(size)
-    tight[smooth:] = _PRIOR
-    # normal + tight and bend share eigenvectors V: V' (normal + tight) V = 1 and
-    # V' bend V = diag(stiff), so that every strength costs a sum and no solve.
-    held = normal + np.diag(tight) + 1e-13 * np.trace(normal) * np.eye(size)
-    unit = np.linalg.inv(np.linalg.cholesky(held))
-    stiff, turn = np.linalg.eigh(unit @ bend @ unit.T)
-    stiff, vectors = np.maximum(stiff, 0.0), unit.T @ turn
-    strengths = np.trace(normal) * 10.0 ** np.arange(-10.0, 2.0, 0.5)
-    loosen = 1.0 / (1.0 + strengths[:, None] * stiff)
-    turned = vectors.T @ right
-    left = total - loosen @ turned**2
-    volume = np.linalg.slogdet(held)[1] - np.log(loosen).sum(axis=1)
-    gain, det = _joined(model, places, weighted, vectors, turned, loosen)
+@njit(cache=True)
+def _evidence(model: _Model, joints: Array, places: Array) -> tuple[float, Array]:
+    """Return twice the log evidence of joints, and of one more at each place, (m,).
 
-    def score(left: Array, volume: Array, joined: int) -> Array:
-        left = np.maximum(left, 1e-12 * total + 1e-30)
-        likelihood = -(model.count - 4.0) * np.log(left) - volume
-        likelihood += _PIECES * np.log(strengths)[:, None] + joined * np.log(_PRIOR)
-        return np.asarray(likelihood.max(axis=0))
+    The joints are added to the smooth part one by one, as Cholesky's method does.
+    """
+    count, axes = joints.size, model.turned.size
+    ramps = _ramps(model, np.concatenate((joints, places)))
+    cross, gram, own, pull = _products(model, ramps, count)
+    alone, joined = -np.inf, np.full(places.size, -np.inf)
+    rows, steps, freed = np.zeros((count + 1, count)), np.zeros(count), np.empty(axes)
+    scale = model.power + np.sum(own[:count]) - count * _PRIOR
+    for strength in scale * 10.0 ** np.arange(-10.0, 2.0, 0.5):
+        # What this strength leaves of each axis.
+        loosen = 1.0 / (1.0 + strength * model.stiff)
+        left = model.total - np.sum(loosen * model.turned**2)
+        volume = model.volume - np.sum(np.log(loosen))
+        for i in range(count + places.size):
+            row = rows[min(i, count)]
+            power, step = own[i], pull[i]
+            for q in range(axes):
+                freed[q] = loosen[q] * cross[i, q]
+                power -= freed[q] * cross[i, q]
+                step -= freed[q] * model.turned[q]
+            for j in range(min(i, count)):
+                shared = gram[i, j]
+                for q in range(axes):
+                    shared -= freed[q] * cross[j, q]
+                for m in range(j):
+                    shared -= row[m] * rows[j, m]
+                row[j] = shared / rows[j, j]
+                power -= row[j] ** 2
+                step -= row[j] * steps[j]
+            gain = step**2 / power
+            if i < count:
+                row[i], steps[i] = np.sqrt(power), step / np.sqrt(power)
+                left -= gain
+                volume += np.log(power)
+                continue
+            more = _likelihood(
+                model, strength, left - gain, volume + np.log(power), count + 1
+            )
+            joined[i - count] = max(joined[i - count], more)
+        alone = max(alone, _likelihood(model, strength, left, volume, count))
+    return alone, joined
 
-    (alone,) = score(left[:, None], volume[:, None], len(joints))
-    return float(alone), score(
-        left[:, None] - gain, volume[:, None] + np.log(det), len(joints) + 1
-    )
+
+@njit(cache=True)
+def _products(
+    model: _Model, ramps: Array, count: int
+) -> tuple[Array, Array, Array, Array]:
+    """Products of ramps with smooth axes, joints, themselves and the offsets."""
+    size = ramps.shape[1]
+    cross, gram = np.zeros((size, model.turned.size)), np.zeros((size, count))
+    own, pull = np.full(size, _PRIOR), np.zeros(size)
+    for n in range(len(ramps)):
+        for i in range(size):
+            if ramps[n, i] != 0.0:
+                weighed = model.share[n] * ramps[n, i]
+                own[i] += weighed * ramps[n, i]
+                pull[i] += weighed * model.offset[n]
+                for j in range(count):
+                    gram[i, j] += weighed * ramps[n, j]
+                for q in range(model.turned.size):
+                    cross[i, q] += ramps[n, i] * model.smooth[n, q]
+    return cross, gram, own, pull
 
 
-def _joined(
-    model: _Model, places: Array, weighted: Array, vectors: Array, turned: Array,
-    loosen: Array,
-) -> tuple[Array, Array]:  # fmt: skip
-    """Return fall of the misfit and determinant, (strengths, m), of a joint each."""
-    ramps = _ramps(model, places)
-    share = (model.weight / model.shared)[:, None]
-    cross = vectors.T @ (weighted.T @ ramps)
-    own = (share * ramps**2).sum(axis=0) + _PRIOR - loosen @ cross**2
-    pull = (share * ramps * model.offset[:, None]).sum(axis=0)
-    pull = pull - loosen @ (cross * turned[:, None])
-    return pull**2 / own, own
+@njit(cache=True)
+def _likelihood(
+    model: _Model, strength: float, left: float, volume: float, joints: int
+) -> float:
+    """Return twice the log evidence at one strength, from misfit and determinant."""
+    left = max(left, 1e-12 * model.total + 1e-30)
+    prior = _PIECES * np.log(strength) + joints * np.log(_PRIOR)
+    return float(prior - (model.size - 4.0) * np.log(left) - volume)

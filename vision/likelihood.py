@@ -18,51 +18,12 @@ _FAIR = 0.1
 
 
 @njit(cache=True)
-def weighed_equations(
-    jacobian: Array, residual: Array, weight: Array, penalty: Array,
-    coefficients: Array, strength: float, shared: float, within: float, free: int,
-    last: bool,
-) -> tuple[float, Array, Array, Array]:  # fmt: skip
-    """Return the weight of the penalty (if NaN: the most likely one) and the equations.
-
-    They are normal x = right - weight pull, with `free` unknowns that cost no penalty.
-    Neighbouring residuals share pixels, so `shared` of them count as one. Before the
-    last step any fair weight does: it moves only the point where the next one starts.
-    """
+def equations(jacobian: Array, weight: Array, residual: Array) -> tuple[Array, Array]:
+    """Return J^T W J and J^T W r; a row of J ends in zeros."""
     size = jacobian.shape[1]
-    normal, right, pull = np.zeros((size, size)), np.zeros(size), np.zeros(size)
-    _add_equations(jacobian, weight / shared, residual, normal, right)
-    # The median, because ties at joints are far stiffer than the rest.
-    data, stored = np.trace(normal), 0.0
-    bend = (size - 1) * np.median(np.diag(penalty))
-    for j in range(size - 1):
-        for k in range(size - 1):
-            pull[j + 1] += penalty[j, k] * coefficients[k]
-        stored += coefficients[j] * pull[j + 1]
-    scale = data / bend
-    # Parts of the rod without data must not make the matrix singular.
-    for j in range(size):
-        normal[j, j] += 1e-11 * data / size
-    normal[1:, 1:] += 1e-9 * scale * penalty
-    if np.isnan(strength):
-        strength = _FAIR * scale
-        if last:
-            total = (np.sum(weight * residual**2) + within) / shared
-            count = max(np.sum(weight) / shared - free, 1.0)
-            strength = _most_likely(
-                scale, normal, penalty, right, pull, total, stored, count, size - free
-            )
-    normal[1:, 1:] += strength * penalty
-    return strength, normal, right, pull
-
-
-@njit(cache=True)
-def _add_equations(
-    jacobian: Array, weight: Array, residual: Array, normal: Array, right: Array
-) -> None:
-    """Add J^T W J and J^T W r; a row of J ends in zeros."""
+    normal, right = np.zeros((size, size)), np.zeros(size)
     for i in range(weight.size):
-        end = right.size
+        end = size
         while end > 0 and jacobian[i, end - 1] == 0.0:
             end -= 1
         for j in range(end):
@@ -70,9 +31,45 @@ def _add_equations(
             right[j] += share * residual[i]
             for k in range(j + 1):
                 normal[j, k] += share * jacobian[i, k]
-    for j in range(right.size):
+    for j in range(size):
         for k in range(j):
             normal[k, j] = normal[j, k]
+    return normal, right
+
+
+@njit(cache=True)
+def penalised(
+    normal: Array, right: Array, penalty: Array, coefficients: Array, strength: float,
+    total: float, count: float, free: int, last: bool,
+) -> tuple[float, Array, Array]:  # fmt: skip
+    """Return the weight of the penalty (if NaN: the most likely one) and the equations.
+
+    The penalty is on the `coefficients` with what they change by, all unknowns but the
+    first; `free` unknowns cost none. `total` and `count` are the sum of squares of the
+    data and how many they are. Before the last step any fair weight does: it moves only
+    the point where the next one starts.
+    """
+    size = right.size
+    # The median, because ties at joints are far stiffer than the rest.
+    data = np.trace(normal)
+    scale = data / ((size - 1) * np.median(np.diag(penalty)))
+    pull = np.zeros(size)
+    pull[1:] = penalty @ coefficients
+    stored = np.sum(coefficients * pull[1:])
+    normal = normal.copy()
+    # Parts of the rod without data must not make the matrix singular.
+    for j in range(size):
+        normal[j, j] += 1e-11 * data / size
+    normal[1:, 1:] += 1e-9 * scale * penalty
+    if np.isnan(strength):
+        strength = _FAIR * scale
+        if last:
+            strength = _most_likely(
+                scale, normal, penalty, right, pull, total, stored,
+                max(count - free, 1.0), size - free,
+            )  # fmt: skip
+    normal[1:, 1:] += strength * penalty
+    return strength, normal, right - strength * pull
 
 
 @njit(cache=True)
@@ -100,14 +97,3 @@ def _most_likely(
             if score < least:
                 best, least = power, score
     return float(scale * 10.0 ** (0.25 * best))
-
-
-@njit(cache=True)
-def freedom_of(root: Array, penalty: Array, strength: float) -> float:
-    """Trace of what maps the data onto the fit: the parameters less those held."""
-    held = 0.0
-    for j in range(len(penalty)):
-        for k in range(len(penalty)):
-            if penalty[j, k] != 0.0:
-                held += penalty[j, k] * np.sum(root[j + 1] * root[k + 1])
-    return len(root) - strength * held

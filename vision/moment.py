@@ -14,14 +14,15 @@ come out too large.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .centreline_fit import CurveFit
+from .centreline_fit import CurveFit, solve
 from .curve import Curve
+from .problem import Problem, moved
 from .spline import Smooth
 
 Array = NDArray[np.float64]
@@ -32,15 +33,13 @@ _MOST = 8.0
 """Factor of curvatures beyond which a joint is no change of stiffness."""
 
 
-def weighed_fit(
-    fit: Callable[[Smooth], CurveFit], joints: Sequence[float], count: float
-) -> CurveFit:
+def weighed_fit(problem: Problem, joints: Sequence[float], count: float) -> CurveFit:
     """Return the mean of the fits with each prior, weighed by their likelihood.
 
     Parameters
     ----------
-    fit : callable
-        Fits with a prior.
+    problem : Problem
+        The measured points, linearised.
     joints : sequence of float
         Arc lengths of the joints.
     count : float
@@ -51,15 +50,15 @@ def weighed_fit(
     CurveFit
         Its covariance holds the doubt which prior is right (Hoeting et al. 1999).
     """
-    free = fit(Smooth())
+    free = solve(problem, Smooth())
     fits, nearest = [free], free
     if joints:
         ratios = _ratios(free.curve, joints)
         if any(not 1.0 / _MOST < ratio < _MOST for ratio in ratios):
             return free
-        nearest = fit(Smooth(2, ratios))
-        fits.append(fit(Smooth(2, _ratios(nearest.curve, joints))))
-    fits.append(fit(Smooth(1, _ratios(nearest.curve, joints))))
+        nearest = solve(problem, Smooth(2, ratios))
+        fits.append(solve(problem, Smooth(2, _ratios(nearest.curve, joints))))
+    fits.append(solve(problem, Smooth(1, _ratios(nearest.curve, joints))))
     loss = np.array([_criterion(item, count) for item in fits])
     loss[0] += _STRONG if joints else 0.0
     weights = np.exp(-0.5 * (loss - loss.min()))
@@ -67,33 +66,22 @@ def weighed_fit(
 
 
 def _mean(fits: Sequence[CurveFit], weights: Array) -> CurveFit:
-    """Return the mean of fits on the same knots, with the scatter in its covariance."""
-
-    def mean(values: list[Array]) -> Array:
-        return np.asarray(np.tensordot(weights, np.array(values), axes=1))
-
-    curve = Curve(
-        s=fits[0].curve.s,
-        points=mean([item.curve.points for item in fits]),
-        theta=mean([item.curve.theta for item in fits]),
-        kappa=mean([item.curve.kappa for item in fits]),
-    )
-    coefficients = mean([item.coefficients for item in fits])
-    parts = []
-    for item, weight in zip(fits, weights, strict=True):
-        shift = (item.curve.points[0] - curve.points[0]) @ curve.normals[0]
-        away = np.concatenate([[shift], item.coefficients - coefficients])
-        parts.append(np.sqrt(weight) * np.column_stack([item.root, away]))
+    """Return the mean of fits to one problem, with their scatter in its covariance."""
+    changes = np.array([fit.change for fit in fits])
+    change = weights @ changes
+    apart = changes - change
+    covariance = (weights * apart.T) @ apart
+    for fit, weight in zip(fits, weights, strict=True):
+        covariance += weight * fit.covariance
     best = fits[int(np.argmax(weights))]
-    # R R^T of all parts side by side, made triangular again.
-    upper = np.asarray(np.linalg.qr(np.hstack(parts)[::-1].T, mode="r"))
+    points, theta, kappa, residual = moved(best.problem, change)
     return replace(
         best,
-        curve=curve,
-        residual=mean([item.residual for item in fits]),
-        coefficients=coefficients,
-        lever=mean([item.lever for item in fits]),
-        root=np.ascontiguousarray(upper.T[::-1, ::-1]),
+        curve=Curve(s=best.curve.s, points=points, theta=theta, kappa=kappa),
+        residual=residual,
+        change=change,
+        covariance=covariance,
+        lever=weights @ np.array([fit.lever for fit in fits]),
     )
 
 

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.jit import njit
-from .centreline_fit import SHARED, CurveFit, fit_curve
+from .centreline_fit import CurveFit, solve
 from .clamp import ClampLines
 from .curve import Curve
 from .edges import Edges, find_edges
 from .ends import find_ends
 from .joints import find_joints
 from .moment import weighed_fit
+from .problem import SHARED, pose
 from .robust import median
 from .rod import Root
 from .spline import Smooth
@@ -28,9 +29,12 @@ Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 
 _PASSES = 5
-_ROUGH_PASSES = 2
-"""Passes that only seek the rod, on every other station and with a supple curve."""
-_STILL_PX = 0.1
+_SEEKING_PASSES, _NEAR_PX = 2, 0.4
+"""At most so many passes only seek the rod, on every other station and with a supple
+curve; one that moves it by less is the last of them."""
+_STILL_PX, _ENDS_STILL_PX = 0.05, 0.15
+"""By how much the curve and its ends may move when all is found; the ends are those of
+the curve as it is then."""
 _BIN_PX = 4.0
 _BINS = 200
 """Stations are averaged over bins before the fit: so far, or so many on a long rod."""
@@ -119,42 +123,40 @@ def refine(
     state = State(
         start.curve, half, start.width, 0.0, last, face_px, start.rough, start.blur
     )
+    seen, seeking = _look(grey, state, sign, 0, seeking=True), True
+    tip, lines, first = find_ends(grey, state, seen, root, sign, 0, walls)
     for turn in range(_PASSES):
-        length = state.last
-        result, first = _pass(grey, state, root, sign, joints, walls, turn)
-        still = abs(state.last - length) + abs(first) < _STILL_PX
-        if turn >= _ROUGH_PASSES and still:
+        if turn:
+            seen = _look(grey, state, sign, turn, seeking=seeking)
+        if walls is not None:
+            seen = to_wall_ends(state, seen, walls)
+        fit, used, aside = _fit(
+            state, seen, first, tip.s, joints, seeking=seeking, clamped=root == "clamp"
+        )
+        at = fit.curve.s + first
+        width, sigma_width = _smooth_width(seen, at, state.width)
+        shaded = np.interp(at, seen.s, seen.edges.shaded(state.blur))
+        state.curve, state.half = fit.curve, 0.5 * width
+        state.first, state.last = 0.0, float(fit.curve.s[-1])
+        # The ends of the curve as it is now: often they move when it does not.
+        tip, lines, first = find_ends(grey, state, seen, root, sign, turn + 1, walls)
+        moved = abs(first) + abs(tip.s - state.last)
+        still = aside < _STILL_PX and moved < _ENDS_STILL_PX
+        if still and not seeking:
             break
-    return result
-
-
-def _pass(
-    grey: Image, state: State, root: Root, sign: float,
-    joints: Callable[[Curve], Sequence[float]], walls: Walls | None, turn: int,
-) -> tuple[Refined, float]:  # fmt: skip
-    """Return what is seen along the curve, and where on it the rod begins."""
-    seen = _look(grey, state, sign, turn)
-    tip, lines, first = find_ends(grey, state, seen, root, sign, turn, walls)
-    clamped = root == "clamp"
-    if walls is not None:
-        seen = to_wall_ends(state, seen, walls)
-    fit, used = _fit(state, seen, first, tip.s, joints, turn, clamped=clamped)
-    at = fit.curve.s + first
-    smooth, sigma = _smooth_width(seen, at, state.width)
-    shaded = np.interp(at, seen.s, seen.edges.shaded(state.blur))
-    state.curve, state.half = fit.curve, 0.5 * smooth
-    state.first, state.last = 0.0, float(fit.curve.s[-1])
+        seeking = seeking and turn + 1 < _SEEKING_PASSES and aside > _NEAR_PX
+    curve = replace(fit.curve, s=fit.curve.s - first)
     return Refined(
-        fit=fit, shaded=shaded, good=used, width=smooth, sigma_width=sigma,
-        tip=replace(tip, s=tip.s - first),
+        fit=replace(fit, curve=curve), shaded=shaded, good=used, width=width,
+        sigma_width=sigma_width, tip=replace(tip, s=tip.s - first),
         clamp=None if lines is None else lines.shifted(first), rough=state.rough,
-    ), first  # fmt: skip
+    )  # fmt: skip
 
 
-def _look(grey: Image, state: State, sign: float, turn: int) -> Seen:
+def _look(grey: Image, state: State, sign: float, turn: int, *, seeking: bool) -> Seen:
     """Find the edges along the curve; know its width, blur and roughness after."""
     width = state.width
-    step = 2.0 if turn < _ROUGH_PASSES else 1.0
+    step = 2.0 if seeking else 1.0
     s = np.linspace(0.0, state.curve.s[-1], int(state.curve.s[-1] / step) + 1)
     points, theta = state.curve.at(s)
     normals = np.column_stack([-np.sin(theta), np.cos(theta)])
@@ -196,8 +198,8 @@ def _scatter(edges: Edges, lag: int) -> float:
 
 def _fit(
     state: State, seen: Seen, first: float, last: float,
-    joints: Callable[[Curve], Sequence[float]], turn: int, *, clamped: bool,
-) -> tuple[CurveFit, NDArray[np.bool_]]:  # fmt: skip
+    joints: Callable[[Curve], Sequence[float]], *, seeking: bool, clamped: bool,
+) -> tuple[CurveFit, NDArray[np.bool_], float]:  # fmt: skip
     width = state.width
     if last - first < 4.0 * width:
         raise LostError("no_rod", "what looks like a rod is shorter than four widths")
@@ -217,7 +219,7 @@ def _fit(
     )
     # Supple while the rod is sought, then stiff enough not to follow shade; the path
     # of a rough rod (yarn) is no elastica, and stays supple.
-    supple = turn < _ROUGH_PASSES or state.rough or state.scatter > 0.03 * width
+    supple = seeking or state.rough or state.scatter > 0.03 * width
     places = joints(state.curve)
     if not supple and not places:
         places = find_joints(
@@ -229,27 +231,26 @@ def _fit(
     places = [x for x in places if spacing < x < last - first - spacing]
 
     def fitted(weights: Array) -> CurveFit:
-        def fit(smooth: Smooth) -> CurveFit:
-            return fit_curve(
-                s - first, measured, _held_ends(weights, s, width), theta=theta,
-                spacing=spacing, joints=places, iterations=1, smooth=smooth,
-                shared=(3.0 if supple else SHARED) / float(seen.s[1]),
-                within=float(within[weights > 0.0].sum()),
-            )  # fmt: skip
-
+        problem = pose(
+            s - first, measured, _held_ends(weights, s, width), theta,
+            spacing=spacing, joints=places,
+            shared=(3.0 if supple else SHARED) / float(seen.s[1]),
+            within=float(within[weights > 0.0].sum()),
+        )  # fmt: skip
         if supple:
-            return fit(Smooth())
-        return weighed_fit(fit, places, float(weights.sum()) / SHARED)
+            return solve(problem, Smooth())
+        return weighed_fit(problem, places, float(weights.sum()) / SHARED)
 
     fit = fitted(weights)
-    if turn >= _ROUGH_PASSES:
+    if not seeking:
         away = np.abs(np.nan_to_num(fit.residual))
         outlying = away > 4.0 * np.sqrt(np.mean(away**2)) + 1e-3
         left = np.where(outlying, 0.0, weights)
         if outlying.any() and left.sum() > 0.5 * weights.sum():
             weights = left
             fit = fitted(weights)
-    return fit, weights > 0.5 * median(weights)
+    aside = np.nanmax(np.abs(offset - fit.residual))
+    return fit, weights > 0.5 * median(weights), float(aside)
 
 
 @njit(cache=True)

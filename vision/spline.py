@@ -146,31 +146,47 @@ def penalty_on_moment(
     M is a parabola between knots. The force F is the one that makes the integral least;
     the normals are those of a curve with angles theta at s.
     """
+    penalty, joints = _penalty(
+        knots, smooth.order, np.array(smooth.ratios or (), dtype=np.float64), s, theta
+    )
+    free = 3 if smooth.order == 2 else 4
+    return penalty, free + joints * (2 if smooth.ratios is None else 1)
+
+
+@njit(cache=True)
+def _penalty(
+    knots: Array, order: int, ratios: Array, s: Array, theta: Array
+) -> tuple[Array, int]:
+    """Return the penalty and the number of joints; M is tied there if it has ratios."""
     first, length, bend, slope_at_start, slope_at_end = _pieces(knots)
-    joined = np.diff(first) > 1
-    joints, tied = int(joined.sum()), smooth.ratios is not None
-    compliance = np.cumprod(np.concatenate([[1.0], smooth.ratios or np.ones(joints)]))
-    stiffness = 1.0 / compliance[np.concatenate([[0], np.cumsum(joined)])][:, None]
-    apart = 0.5 * (length[1:] + length[:-1])
-    penalty = np.zeros((len(knots) - 4, len(knots) - 4))
-    slope_at_start, slope_at_end = slope_at_start * stiffness, slope_at_end * stiffness
-    if smooth.order == 2:
-        add_squares(first, bend * stiffness, length, penalty)
+    count = first.size
+    tie = np.zeros(count - 1)
+    joints, stiffness = 0, 1.0
+    for i in range(count):
+        if i > 0 and first[i] - first[i - 1] > 1:
+            joints += 1
+            if ratios.size > 0:
+                apart = 0.5 * (length[i] + length[i - 1])
+                tie[i - 1] = _TIED * apart ** (3.0 - 2.0 * order)
+                stiffness /= ratios[joints - 1]
+        bend[i] *= stiffness
+        slope_at_start[i] *= stiffness
+        slope_at_end[i] *= stiffness
+    penalty = np.zeros((knots.size - 4, knots.size - 4))
+    if order == 2:
+        add_squares(first, bend, length, penalty)
     else:
         # M' runs straight over a piece: the trapezoidal rule, on both its ends.
-        ends = np.interp(np.unique(knots), s, theta)
-        angles = np.concatenate([ends[:-1], ends[1:]])
+        ends = np.interp(np.append(knots[3], knots[3] + np.cumsum(length)), s, theta)
+        angles = np.concatenate((ends[:-1], ends[1:]))
         _add_unforced(
-            np.concatenate([first, first]),
-            np.concatenate([slope_at_start, slope_at_end]),
-            np.column_stack([-np.sin(angles), np.cos(angles)]),
-            0.5 * np.concatenate([length, length]), penalty,
+            np.concatenate((first, first)),
+            np.concatenate((slope_at_start, slope_at_end)),
+            np.column_stack((-np.sin(angles), np.cos(angles))),
+            0.5 * np.concatenate((length, length)), penalty,
         )  # fmt: skip
-    if tied:
-        tie = _TIED * joined * apart ** (3.0 - 2.0 * smooth.order)
-        _add_jumps(first, slope_at_end, slope_at_start, tie, penalty)
-    free = 3 if smooth.order == 2 else 4
-    return penalty, free + joints * (1 if tied else 2)
+    _add_jumps(first, slope_at_end, slope_at_start, tie, penalty)
+    return penalty, joints
 
 
 @njit(cache=True)
@@ -216,21 +232,29 @@ def _add_jumps(
                 normal[first[i] + j, first[i] + k] += weight[i] * row[j] * row[k]
 
 
+@njit(cache=True)
 def _pieces(knots: Array) -> tuple[NDArray[np.int64], Array, Array, Array, Array]:
     """Return of each piece: first spline, length, theta''', theta'' at both ends.
 
     The last three are rows of the four splines' own, shape (pieces, 4) each.
     """
-    low, high = knots[_DEGREE:-_DEGREE - 1], knots[_DEGREE + 1:-_DEGREE]  # fmt: skip
+    low, high = knots[3:-4], knots[4:-3]
     real = high > low
     low, length = low[real], (high - low)[real]
     # Second differences of theta' at points well inside, where no knot is in doubt.
-    inner = low[:, None] + length[:, None] * np.array([0.1, 0.5, 0.9])
-    basis = design(knots, inner.ravel())
-    a, b, c = basis.slope.reshape(len(low), 3, 4).transpose(1, 0, 2)
-    step, half = 0.4 * length[:, None], 0.5 * length[:, None]
-    bend, middle = (a - 2.0 * b + c) / step**2, (c - a) / (2.0 * step)
-    return basis.first[::3], length, bend, middle - half * bend, middle + half * bend
+    inner = np.empty(3 * low.size)
+    for k in range(3):
+        inner[k::3] = low + (0.1 + 0.4 * k) * length
+    first = np.empty(inner.size, np.int64)
+    value, slope = np.empty((inner.size, 4)), np.empty((inner.size, 4))
+    _fill_basis(knots, inner, first, value, slope)
+    bend, start, end = np.empty((3, low.size, 4))
+    for i in range(low.size):
+        a, b, c = slope[3 * i], slope[3 * i + 1], slope[3 * i + 2]
+        bend[i] = (a - 2.0 * b + c) / (0.4 * length[i]) ** 2
+        middle, half = (c - a) / (0.8 * length[i]), 0.5 * length[i] * bend[i]
+        start[i], end[i] = middle - half, middle + half
+    return first[::3].copy(), length, bend, start, end
 
 
 @njit(cache=True)

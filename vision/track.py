@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.jit import njit
-from .centreline_fit import SHARED, fit_curve
+from .centreline_fit import fit_curve
 from .curve import Curve
 from .edges import STEP_PX, _bilinear
+from .problem import SHARED
 from .robust import median
 from .rough_edges import SHADED_LEVEL, rough_edges
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from magbend.vision.cholesky import factor, inverse, solved, solved_half
+from magbend.vision.cholesky import factor, inverse, solved, solved_half, squared
 from magbend.vision.robust import median, quantile
 
 
@@ -24,6 +24,7 @@ def test_systems_are_solved_as_numpy_solves_them(size, seed):
     half = solved_half(upper, right)
     assert half @ half == pytest.approx(right @ exact, rel=1e-9)
     np.testing.assert_allclose(inverse(upper) @ upper, np.eye(size), atol=1e-9)
+    np.testing.assert_allclose(squared(upper), upper @ upper.T, atol=1e-9)
 
 
 def test_what_has_no_factor_is_nan():

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
-from magbend.vision.centreline_fit import fit_curve
+from magbend.vision.centreline_fit import solve
 from magbend.vision.moment import weighed_fit
+from magbend.vision.problem import pose
 from magbend.vision.spline import Smooth, design, knots_between, penalty_on_moment
 
 JOINTS = (200.0, 400.0)
@@ -99,14 +100,9 @@ def measured(kappa, rng):
 
 def fits(kappa, seed):
     points, theta = measured(kappa, np.random.default_rng(seed))
-
-    def fit(smooth):
-        return fit_curve(
-            S, points, np.full(len(S), 4.0), spacing=30.0, joints=JOINTS, theta=theta,
-            smooth=smooth,
-        )  # fmt: skip
-
-    return fit(Smooth()), weighed_fit(fit, JOINTS, len(S) / 2.0)
+    weights = np.full(len(S), 4.0)
+    problem = pose(S, points, weights, theta, spacing=30.0, joints=JOINTS)
+    return solve(problem, Smooth()), weighed_fit(problem, JOINTS, len(S) / 2.0)
 
 
 def test_the_direction_at_the_clamp_gains_from_the_moment():
