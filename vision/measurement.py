@@ -24,8 +24,11 @@ POINT_COLUMNS = (
 )  # fmt: skip
 """The columns of every measured centreline, in the order of ``centrelines.csv``."""
 
+DEVIATION_COLUMNS = ("sigma_theta_rad", "sigma_kappa_per_mm", "sigma_width_mm")
+"""Their standard deviations, at the end of each row of ``centrelines.csv``."""
+
 EXTRA_COLUMNS = (
-    "width_px", "sigma_px", "sigma_theta_rad", "sigma_kappa_per_mm", "sigma_width_mm",
+    "width_px", "sigma_px", *DEVIATION_COLUMNS,
     "left_x_px", "left_y_px", "right_x_px", "right_y_px",
 )  # fmt: skip
 """Columns that a measurement may hold besides; left and right are the side edges."""

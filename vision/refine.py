@@ -293,6 +293,7 @@ def _smooth_width(seen: Seen, at: Array, typical: float) -> tuple[Array, Array]:
     count = np.convolve(good.astype(np.float64), window)[half:-half]
     known = count >= 0.3 * len(window)
     mean = np.interp(s, s[known], total[known] / count[known])
-    scatter = 1.4826 * median(np.abs(width - mean)[good])
-    sigma = scatter * np.sqrt(2.0 / np.maximum(count, 1.0))
+    # From means that share no station: neighbours share samples and levels.
+    jump = median(np.abs(mean[len(window) :] - mean[: -len(window)]))
+    sigma = 1.05 * jump * np.sqrt(len(window) / np.maximum(count, 1.0))
     return np.interp(at, s, mean), np.interp(at, s, sigma)

@@ -105,11 +105,31 @@ class Truth:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """A synthetic photograph, ndarray of uint8 and shape (h, w), and its truth."""
+    """A synthetic photograph and its truth.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    image : ndarray, shape (height, width), uint8
+        The photograph.
+    truth : Truth
+        What it shows.
+    linear : ndarray, shape (height, width), float32
+        The light that fell on the sensor.
+    noise : float
+        Standard deviation of the noise that the sensor added to it.
+    """
 
     name: str
     image: NDArray[np.uint8]
     truth: Truth
+    linear: NDArray[np.float32]
+    noise: float
+
+    def again(self, rng: np.random.Generator) -> Frame:
+        """Return another photograph of the same scene: only its noise is new."""
+        return replace(self, image=_recorded(self.linear, self.noise, rng))
 
 
 def curve(
@@ -245,7 +265,9 @@ def draw(
     linear = _expose(rod, block, light, px_per_mm, rng)
     return Frame(
         name=name,
-        image=encode_srgb(linear),
+        image=_recorded(linear, light.noise, rng),
+        linear=linear,
+        noise=light.noise,
         truth=Truth(
             centreline=shape,
             points_px=points,
@@ -301,7 +323,7 @@ def _expose(
     px_per_mm: float,
     rng: np.random.Generator,
 ) -> NDArray[np.float32]:
-    """Return the picture in linear light."""
+    """Return the light that falls on the sensor."""
     height, width = rod.shape
     paper = np.full(rod.shape, light.paper, dtype=np.float32)
     if light.shadow_depth > 0.0:
@@ -322,8 +344,15 @@ def _expose(
     linear *= (1.0 + light.gradient * (ramp - 0.5)).astype(np.float32)
     if light.blur_px > 0.0:
         linear = np.asarray(cv2.GaussianBlur(linear, (0, 0), light.blur_px))
-    noise = rng.standard_normal(linear.shape, dtype=np.float32)
-    return np.asarray(linear + np.float32(light.noise) * noise)
+    return np.asarray(linear)
+
+
+def _recorded(
+    linear: NDArray[np.float32], noise: float, rng: np.random.Generator
+) -> NDArray[np.uint8]:
+    """Return what a camera writes: noise, the sRGB curve and 8 bits."""
+    grain = rng.standard_normal(linear.shape, dtype=np.float32)
+    return encode_srgb(linear + np.float32(noise) * grain)
 
 
 SHAPES: tuple[tuple[str, Kind, float], ...] = (

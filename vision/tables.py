@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from ..core.centreline import Centreline
 from ..core.errors import ConfigError
 from .calibration import Calibration
-from .measurement import POINT_COLUMNS, Measurement, Pose
+from .measurement import DEVIATION_COLUMNS, POINT_COLUMNS, Measurement, Pose
 
 Array = NDArray[np.float64]
 
-CENTRELINE_HEADER = ("image", *POINT_COLUMNS)
+CENTRELINE_HEADER = ("image", *POINT_COLUMNS, *DEVIATION_COLUMNS)
 FRAME_HEADER = (
     "image", "status", "flags", "length_mm", "tip_x_mm", "tip_y_mm", "tip_angle_deg",
     "width_mm", "clamp_x_px", "clamp_y_px", "tip_x_px", "tip_y_px", "clamp_x_mm",
@@ -95,10 +95,11 @@ def centreline_rows(image: str, measurement: Measurement) -> str:
     """Return the rows of ``centrelines.csv`` of one photograph; none if it failed."""
     if not measurement.ok:
         return ""
-    columns = [measurement.points[name] for name in POINT_COLUMNS]
+    nothing = np.full(len(measurement.points["good"]), np.nan)
+    columns = [measurement.points.get(name, nothing) for name in CENTRELINE_HEADER[1:]]
     name = row(image).rstrip("\n")
     lines = [
-        f"{name},{','.join(number(value) for value in values[:-1])},{values[-1]:.0f}"
+        f"{name},{','.join(number(value) for value in values)}"
         for values in zip(*columns, strict=True)
     ]
     return "\n".join(lines) + "\n"

@@ -91,7 +91,8 @@ def test_header_is_the_contract(tmp_path, folder):
     out = tmp_path / "out"
     extract_files([folder], out, settings=SETTINGS, overlays=False)
     assert (out / "centrelines.csv").read_text().splitlines()[0] == (
-        "image,s_mm,x_mm,y_mm,theta_rad,kappa_per_mm,width_mm,sigma_mm,x_px,y_px,good"
+        "image,s_mm,x_mm,y_mm,theta_rad,kappa_per_mm,width_mm,sigma_mm,x_px,y_px,good,"
+        "sigma_theta_rad,sigma_kappa_per_mm,sigma_width_mm"
     )
     assert (out / "frames.csv").read_text().splitlines()[0].startswith(
         "image,status,flags,length_mm,tip_x_mm,tip_y_mm,tip_angle_deg,width_mm,"

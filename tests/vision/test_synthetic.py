@@ -10,7 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from magbend.core.errors import InputError
+from magbend.vision.extract import extract
 from magbend.vision.measurement import Measurement, failure
+from magbend.vision.photo import as_photo
 from magbend.vision.raster import coverage, coverage_of
 from magbend.vision.score import score, signed_distance
 from magbend.vision.synthetic import (
@@ -220,3 +222,16 @@ def test_distance_has_a_sign_and_runs_on_past_the_ends():
 def test_refusal_has_no_score(straight):
     with pytest.raises(ValueError, match="no rod"):
         score(failure("no_rod", "no rod"), straight.truth)
+
+
+def test_the_width_is_as_sure_as_it_says():
+    """Neighbouring stations share samples and levels; the deviation must know it."""
+    rng = np.random.default_rng(4)
+    shape = curve("arc", angle_deg=60.0)
+    frame = draw(shape, rng, light=LIGHTS["clean"], size_px=(900, 900))
+    within = []
+    for _ in range(6):
+        frame = frame.again(rng)
+        points = extract(as_photo(frame.image), frame.truth.calibration).points
+        within.append(np.abs(points["width_mm"] - 1.0) < points["sigma_width_mm"])
+    assert 0.58 < np.mean(within) < 0.78
