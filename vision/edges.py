@@ -176,8 +176,12 @@ def find_edges(
 
 
 def level_spans(blur: float, fuzz: float) -> tuple[float, float, float]:
-    """Return where levels are taken, px: close to the edge, clear of it; how far on."""
-    wide = max(blur, fuzz)
+    """Return where levels are taken, px: close to the edge, clear of it; how far on.
+
+    A little farther than the blur itself asks for: on photographs what is closer to the
+    edge is unsure (a rounded edge, the lens's halo).
+    """
+    wide = max(math.hypot(blur, math.sqrt(_SLOPE_VARIANCE)), fuzz)
     return max(0.6, 1.1 * wide), max(1.5, 2.2 * wide), max(4.0, 3.0 * wide)
 
 

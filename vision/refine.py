@@ -32,9 +32,11 @@ _PASSES = 5
 _SEEKING_PASSES, _NEAR_PX = 2, 0.4
 """At most so many passes only seek the rod, on every other station and with a supple
 curve; one that moves it by less is the last of them."""
-_STILL_PX, _ENDS_STILL_PX = 0.05, 0.15
+_STILL_PX, _ENDS_STILL_PX = 0.02, 0.15
 """By how much the curve and its ends may move when all is found; the ends are those of
 the curve as it is then."""
+_JOINTS_STILL_PX = 0.05
+"""A curve that moves by less keeps its joints."""
 _BIN_PX = 4.0
 _BINS = 200
 """Stations are averaged over bins before the fit: so far, or so many on a long rod."""
@@ -125,14 +127,17 @@ def refine(
     )
     seen, seeking = _look(grey, state, sign, 0, seeking=True), True
     tip, lines, first = find_ends(grey, state, seen, root, sign, 0, walls)
+    places, aside = None, np.inf
     for turn in range(_PASSES):
         if turn:
             seen = _look(grey, state, sign, turn, seeking=seeking)
         if walls is not None:
             seen = to_wall_ends(state, seen, walls)
-        fit, used, aside = _fit(
-            state, seen, first, tip.s, joints, seeking=seeking, clamped=root == "clamp"
-        )
+        known = None if places is None or aside > _JOINTS_STILL_PX else places - first
+        fit, used, aside, places = _fit(
+            state, seen, first, tip.s, joints, known, seeking=seeking,
+            clamped=root == "clamp",
+        )  # fmt: skip
         at = fit.curve.s + first
         width, sigma_width = _smooth_width(seen, at, state.width)
         shaded = np.interp(at, seen.s, seen.edges.shaded(state.blur))
@@ -198,8 +203,13 @@ def _scatter(edges: Edges, lag: int) -> float:
 
 def _fit(
     state: State, seen: Seen, first: float, last: float,
-    joints: Callable[[Curve], Sequence[float]], *, seeking: bool, clamped: bool,
-) -> tuple[CurveFit, NDArray[np.bool_], float]:  # fmt: skip
+    joints: Callable[[Curve], Sequence[float]], known: Array | None, *, seeking: bool,
+    clamped: bool,
+) -> tuple[CurveFit, NDArray[np.bool_], float, Array | None]:  # fmt: skip
+    """Return the curve, points used, how far it moved, and joints as they were found.
+
+    `known` are the joints that a pass before found, from the root on.
+    """
     width = state.width
     if last - first < 4.0 * width:
         raise LostError("no_rod", "what looks like a rod is shorter than four widths")
@@ -220,26 +230,26 @@ def _fit(
     # Supple while the rod is sought, then stiff enough not to follow shade; the path
     # of a rough rod (yarn) is no elastica, and stays supple.
     supple = seeking or state.rough or state.scatter > 0.03 * width
-    places = joints(state.curve)
-    if not supple and not places:
-        places = find_joints(
+    places = np.array(joints(state.curve))
+    if not supple and not places.size:
+        places = known if known is not None else np.array(find_joints(
             seen.s - first, seen.theta, np.where(use, seen.edges.middle, 0.0),
             use.astype(np.float64), width=width, shared=SHARED,
-        )  # fmt: skip
+        ))  # fmt: skip
 
     spacing = max((1.0 if supple else 1.5) * width, (last - first) / 50.0)
-    places = [x for x in places if spacing < x < last - first - spacing]
+    inner = [x for x in places if spacing < x < last - first - spacing]
 
     def fitted(weights: Array) -> CurveFit:
         problem = pose(
             s - first, measured, _held_ends(weights, s, width), theta,
-            spacing=spacing, joints=places,
+            spacing=spacing, joints=inner,
             shared=(3.0 if supple else SHARED) / float(seen.s[1]),
             within=float(within[weights > 0.0].sum()),
         )  # fmt: skip
         if supple:
             return solve(problem, Smooth())
-        return weighed_fit(problem, places, float(weights.sum()) / SHARED)
+        return weighed_fit(problem, inner, float(weights.sum()) / SHARED)
 
     fit = fitted(weights)
     if not seeking:
@@ -250,7 +260,12 @@ def _fit(
             weights = left
             fit = fitted(weights)
     aside = np.nanmax(np.abs(offset - fit.residual))
-    return fit, weights > 0.5 * median(weights), float(aside)
+    return (
+        fit,
+        weights > 0.5 * median(weights),
+        float(aside),
+        None if supple else places,
+    )
 
 
 @njit(cache=True)

@@ -31,6 +31,9 @@ LEAST_SLENDERNESS = 6.0
 LEAST_SHARE = 0.2
 """Shortest rod beside another long thin thing, over the length of that."""
 
+_FINE = 3.0
+"""Half width under which the commonest width may be that of a hair or a line."""
+
 _HAIR = 0.35
 """Width of what grows from the tip of a rod in a clamp, over the rod's, if a hair."""
 
@@ -140,7 +143,8 @@ def _thin_parts(roi: Mask, origin: tuple[int, int], binary: Binary) -> list[Cand
         # Grains of noise along the edges of something wide may outnumber the rod.
         common, thinner, thicker = _half_widths(ridge[ridge >= _GRAIN])
         found = of_width(common)
-    found = _without_hairs(found, of_width(thicker))
+    if common < _FINE:
+        found = _without_hairs(found, of_width(thicker))
     # A bar that reaches far into the picture is long and thin itself, but the clamp of
     # a thinner one that grows from its end.
     longest = max((item.length_px for item in found), default=0.0)
