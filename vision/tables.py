@@ -204,7 +204,7 @@ def read_centrelines(path: Path) -> dict[str, dict[str, Array]]:
         If the file is missing, lacks a column or holds something else than numbers.
     """
     cells: dict[str, list[list[float]]] = {}
-    for line in _rows(path, CENTRELINE_HEADER):
+    for line in _rows(path, ("image", *POINT_COLUMNS)):
         values = [_float(path, line, name) for name in POINT_COLUMNS]
         cells.setdefault(line["image"], []).append(values)
     return {

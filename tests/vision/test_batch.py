@@ -87,6 +87,16 @@ def test_tables_hold_what_was_measured(tmp_path, folder, good):
         assert picture.shape == (SIZE[1], SIZE[0], 3)
 
 
+def test_tables_without_the_deviations_are_read_as_before(tmp_path, folder):
+    out = tmp_path / "out"
+    extract_files([folder], out, settings=SETTINGS, overlays=False)
+    new = read_centrelines(out / "centrelines.csv")
+    old = tmp_path / "old.csv"
+    lines = (out / "centrelines.csv").read_text().splitlines()
+    old.write_text("".join(line.rsplit(",", 3)[0] + "\n" for line in lines))
+    np.testing.assert_equal(read_centrelines(old), new)
+
+
 def test_header_is_the_contract(tmp_path, folder):
     out = tmp_path / "out"
     extract_files([folder], out, settings=SETTINGS, overlays=False)
