@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..core.jit import njit
 from .curve import Curve
+from .edges import clear_of
 from .tip import SPAN, STEP_PX, EndFace, crossings_of, fit_step, lanes, line_through
 
 Array = NDArray[np.float64]
@@ -100,7 +101,7 @@ def find_clamp(
     ClampLines
         Each None where it is not seen.
     """
-    near = max(1.5, 2.2 * blur)
+    near = clear_of(blur)
     span = reach + near + max(8.0, SPAN * blur)
     s = np.arange(expected - span, expected + span, STEP_PX)
     return ClampLines(
@@ -115,7 +116,7 @@ def _face(
     grey: Image, curve: Curve, s: Array, expected: float, width: float, blur: float,
     contrast: float, reach: float, sign: float, fine: bool,
 ) -> EndFace | None:  # fmt: skip
-    near = max(1.5, 2.2 * blur)
+    near = clear_of(blur)
     across = 0.6 * _LANES * width
     light = np.ascontiguousarray(lanes(grey, curve, s, across, sign)[:, ::-1])
     place = _steepest(light, -s[::-1], -expected, reach, 0.12 * contrast)
@@ -138,7 +139,7 @@ def _front(
     grey: Image, curve: Curve, s: Array, expected: float, width: float, blur: float,
     contrast: float, reach: float, sign: float, fine: bool,
 ) -> EndFace | None:  # fmt: skip
-    near = max(1.5, 2.2 * blur)
+    near = clear_of(blur)
     beside = (_BESIDE if fine else _BESIDE[::2]) * width + near + 3.0
     crossings: list[Array] = []
     offsets: list[Array] = []

@@ -103,7 +103,7 @@ class Edges:
 
     def shaded(self, blur: float) -> Array:
         """Half the difference of what the paper's slope does to either edge, px."""
-        reach = 1.5 * max(1.5, 2.2 * blur)
+        reach = 1.5 * clear_of(blur)
         with np.errstate(invalid="ignore", divide="ignore"):
             low = self.shade_low / self.slope_low
             high = self.shade_high / self.slope_high
@@ -175,6 +175,11 @@ def find_edges(
     )  # fmt: skip
 
 
+def clear_of(blur: float) -> float:
+    """Return how far from an edge its blur hardly reaches, px."""
+    return max(1.5, 2.2 * blur)
+
+
 def level_spans(blur: float, fuzz: float) -> tuple[float, float, float]:
     """Return where levels are taken, px: close to the edge, clear of it; how far on.
 
@@ -182,7 +187,7 @@ def level_spans(blur: float, fuzz: float) -> tuple[float, float, float]:
     edge is unsure (a rounded edge, the lens's halo).
     """
     wide = max(math.hypot(blur, math.sqrt(_SLOPE_VARIANCE)), fuzz)
-    return max(0.6, 1.1 * wide), max(1.5, 2.2 * wide), max(4.0, 3.0 * wide)
+    return max(0.6, 1.1 * wide), clear_of(wide), max(4.0, 3.0 * wide)
 
 
 @njit(cache=True)

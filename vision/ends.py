@@ -22,7 +22,6 @@ Image = NDArray[np.float32]
 APART_PX = 2.0
 """The two lines at a clamp tell different things if they are farther apart."""
 
-
 _FINE = 2
 """The first pass whose ends are more than places to look at next."""
 

@@ -207,8 +207,7 @@ def _levels(binary: Binary) -> list[float]:
 def _is_part(one: Candidate, other: Candidate) -> bool:
     """Whether a candidate's middle lies on another."""
     middle = one.points_px[len(one.points_px) // 2]
-    away = np.hypot(*(other.points_px - middle).T).min()
-    return bool(away < max(one.width_px, other.width_px))
+    return other.away(middle) < max(one.width_px, other.width_px)
 
 
 def _likeliest(rods: list[Candidate]) -> Candidate:

@@ -74,6 +74,10 @@ class Candidate:
         """Length over width."""
         return self.length_px / self.width_px
 
+    def away(self, point: Array) -> float:
+        """Distance of a point (x, y) from the start curve, px."""
+        return float(np.hypot(*(self.points_px - point).T).min())
+
 
 def find_candidates(binary: Binary) -> list[Candidate]:
     """Return the long thin things of a picture, longest first.
@@ -191,8 +195,7 @@ def _is_end(one: Candidate, other: Candidate) -> bool:
 
 def _touches(one: Candidate, other: Candidate) -> bool:
     """Whether a thing grows from beside another."""
-    away = np.hypot(*(other.points_px - one.points_px[0]).T).min()
-    return bool(away < 1.5 * other.width_px)
+    return other.away(one.points_px[0]) < 1.5 * other.width_px
 
 
 def _of_width(

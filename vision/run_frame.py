@@ -41,16 +41,16 @@ def in_run_frames(done: Iterable[Done], runs: Mapping[str, str]) -> list[Done]:
         The run of each image; an image without one keeps its own frame.
     """
     ready = list(done)
-    groups: dict[str, list[int]] = {}
+    groups: dict[str, dict[int, Reading]] = {}
     for index, each in enumerate(ready):
-        if runs.get(each.image) and _reading(each) is not None:
-            groups.setdefault(runs[each.image], []).append(index)
-    for run, members in groups.items():
-        readings = [r for i in members if (r := _reading(ready[i])) is not None]
+        run = runs.get(each.image)
+        if run and (reading := _reading(each)) is not None:
+            groups.setdefault(run, {})[index] = reading
+    for run, readings in groups.items():
         if len(readings) < 2:
             continue
-        direction = shared_direction(readings)
-        for index in members:
+        direction = shared_direction(list(readings.values()))
+        for index in readings:
             ready[index] = (
                 _flagged(ready[index])
                 if direction is None

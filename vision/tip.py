@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..core.jit import njit
 from .curve import Curve
-from .edges import _bilinear
+from .edges import _bilinear, clear_of
 from .robust import median, quantile
 
 Array = NDArray[np.float64]
@@ -135,7 +135,7 @@ def find_tip(
     EndFace or None
         None where fewer than half of the lanes cross.
     """
-    near = max(1.5, 2.2 * blur)
+    near = clear_of(blur)
     inner = max(4.0, 0.5 * width)
     outer = max(4.0, SPAN * blur)
     s = np.arange(
