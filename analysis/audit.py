@@ -20,7 +20,7 @@ from .. import sim
 from ..core.files import write_text
 from ..core.magnet import Magnet
 from ..core.units import GRAVITY_M_PER_S2, MU0
-from ..sim.magnet_fit import axis_flux_by_integral_mT
+from ..sim.magnet.fit import axis_flux_by_integral_mT
 from .probe import fit_standoff, read_probe_csv
 
 READINGS = ((70.0, 38.0, 1.3578), (60.0, 50.0, 1.3050), (50.0, 66.0, 1.2938))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.jit import njit
-from ..sim.batch_shapes import in_threads
+from ..sim.batch.shapes import in_threads
 
 Array = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from ..core.errors import SolverError
 from ..core.specimen import Specimen
 from ..core.specimen_file import specimen_dict
 from ..sim import Field, solve
-from ..sim.batch_shapes import solve_shapes
+from ..sim.batch.shapes import solve_shapes
 from . import goals
 from .goals import Goal
 from .library.space import sobol_points

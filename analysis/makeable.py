@@ -21,7 +21,7 @@ from ..core.specimen import Section, Specimen
 from ..core.toml import FileModel
 from ..sim import Field as LoadField
 from ..sim import MagnetField, UniformField
-from ..sim.batch_shapes import Designs
+from ..sim.batch.shapes import Designs
 from .feasible import falling_moduli, fitting_lengths
 
 Array = NDArray[np.float64]

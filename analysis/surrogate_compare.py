@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..sim.batch_shapes import Designs, solve_shapes
+from ..sim.batch.shapes import Designs, solve_shapes
 from . import descriptors, expansion
 from .surrogate import POINTS, Surrogate, predict, scale
 from .surrogate_fit import deviations, draw

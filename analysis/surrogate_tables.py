@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from ..core.errors import ConfigError, InputError, StoreError
 from ..core.files import write_text
 from ..core.toml import read_text
-from ..sim.batch_shapes import Designs, solve_shapes
+from ..sim.batch.shapes import Designs, solve_shapes
 
 Array = NDArray[np.float64]
 

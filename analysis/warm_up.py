@@ -16,8 +16,8 @@ import numpy as np
 
 def is_warm() -> bool:
     """Return whether the largest kernels are in the cache, so that nothing compiles."""
-    from ..sim.planar import solve_rows
-    from ..sim.solid_solve import solve_shape
+    from ..sim.planar.solver import solve_rows
+    from ..sim.solid.newton import solve_shape
     from ..vision.edges import _sample
 
     return all(kernel.is_stored for kernel in (solve_rows, solve_shape, _sample))

@@ -15,7 +15,7 @@ from magbend.analysis.design import design
 from magbend.analysis.makeable import Candidates, Makeable, designs_in, dimension, rods
 from magbend.core.errors import SolverError
 from magbend.sim import UniformField
-from magbend.sim.batch_shapes import solve_shapes
+from magbend.sim.batch.shapes import solve_shapes
 
 
 def main(targets: int) -> None:

@@ -20,13 +20,13 @@ from scipy.integrate import solve_bvp
 from magbend.core.magnet import Magnet
 from magbend.core.units import MU0
 from magbend.sim import MagnetField, Support, UniformField, gmc
+from magbend.sim.one_rod import solve
 from magbend.sim.scaling import field_array
-from magbend.sim.solve import solve
-from magbend.sim.spatial import SpatialRod, _steps, solve_spatial
-from magbend.sim.spatial_index import morse_index, unknowns
-from magbend.sim.spatial_march import workspace
-from magbend.sim.spatial_rod import rod_table
-from magbend.sim.spatial_solve import COARSE, newton
+from magbend.sim.spatial.index import morse_index, unknowns
+from magbend.sim.spatial.march import workspace
+from magbend.sim.spatial.newton import COARSE, newton
+from magbend.sim.spatial.rod import rod_table
+from magbend.sim.spatial.solver import SpatialRod, _steps, solve_spatial
 
 FIELD = UniformField(flux_mT=50.0)
 WEIGHT = Support(gravity_m_s2=(0.0, 0.0, -9.80665))

@@ -17,7 +17,7 @@ import numpy as np
 
 from magbend.core.magnet import Magnet
 from magbend.sim import MagnetField, UniformField, gmc
-from magbend.sim.solve import solve
+from magbend.sim.one_rod import solve
 
 FEM = Path(__file__).parents[1] / "fixtures" / "fem"
 

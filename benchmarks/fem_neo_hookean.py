@@ -30,7 +30,7 @@ from scipy.sparse.linalg import splu
 from magbend.core.magnet import Magnet
 from magbend.core.units import MU0
 from magbend.sim import MagnetField, UniformField, gmc, magnet_flux_mT
-from magbend.sim.solve import solve
+from magbend.sim.one_rod import solve
 
 GAUSS, WEIGHT = np.polynomial.legendre.leggauss(3)
 SIZES = ((0.15, 1.2, (0.0, 0.5)), (0.08, 0.6, (0.0, 0.33, 0.5)),

@@ -73,7 +73,7 @@ def shape(
     from ..core.files import output_file
     from ..core.jit import once
     from ..sim.fields import Support
-    from ..sim.solve import solve
+    from ..sim.one_rod import solve
 
     rod = _specimen(gmc, specimen, remeasured, density_kg_m3)
     field = _field(field_mT, angle_deg, magnet, gap_mm)
@@ -170,7 +170,7 @@ def _check(
 ) -> float:
     if model != "rod":
         raise typer.BadParameter("--verify belongs to --model rod")
-    from ..sim.check import verify
+    from ..sim.check.solver import verify
 
     return verify(rod, field, solution, support=support)
 

@@ -11,8 +11,8 @@ from .console import print_json
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
-    from ..sim.equilibria import Equilibrium
-    from ..sim.equilibria_folds import Branch, Fold
+    from ..sim.equilibria.find import Equilibrium
+    from ..sim.equilibria.folds import Branch, Fold
 
 EXAMPLE = (
     "Example: magbend sim equilibria --gmc 2 --field-mT 500 --angle-deg 150 --fold"
@@ -48,8 +48,8 @@ def equilibria(
     """Find every planar equilibrium of a weightless rod, stable or not."""
     from ..core.files import output_file
     from ..core.jit import once
-    from ..sim.equilibria import find_equilibria
-    from ..sim.equilibria_folds import trace_branches
+    from ..sim.equilibria.find import find_equilibria
+    from ..sim.equilibria.folds import trace_branches
     from ..sim.fields import Support, UniformField
 
     rod = _specimen(gmc, specimen, remeasured)
@@ -62,7 +62,7 @@ def equilibria(
     if fold or figure is not None:
         branches = once(lambda: trace_branches(rod, field, support=support))
     if figure is not None:
-        from ..sim.equilibria_figure import draw_equilibria
+        from ..sim.study.equilibria_figure import draw_equilibria
 
         title = f"{rod.name}, {field_mT:g} mT at {angle_deg:g} deg"
         draw_equilibria(figure, found, branches, title=title)

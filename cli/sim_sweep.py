@@ -46,9 +46,9 @@ def sweep(
         raise typer.BadParameter("--values belongs to one study: name it")
     from ..core.files import output_folder, write_text
     from ..sim.fields import UniformField
-    from ..sim.figures import draw_study
-    from ..sim.sweep import STUDIES, sweep_csv
-    from ..sim.sweep import sweep as solve_study
+    from ..sim.study.figures import draw_study
+    from ..sim.study.sweep import STUDIES, sweep_csv
+    from ..sim.study.sweep import sweep as solve_study
     from ..sim.table1 import gmc as table1
 
     if specimen is None:

@@ -14,8 +14,8 @@ from ..core.errors import InputError
 from ..core.specimen import Specimen
 from ..core.units import MU0, T_from_mT, rad_from_deg
 from .fields import FLUX_LIMIT_T, Field, MagnetField, Support, UniformField
-from .magnet_field import BLOCK_SIZE, magnet_block
-from .planar_march import CUBOID, UNIFORM
+from .magnet.field import BLOCK_SIZE, magnet_block
+from .planar.march import CUBOID, UNIFORM
 
 Array = NDArray[np.float64]
 P = ParamSpec("P")

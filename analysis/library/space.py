@@ -21,7 +21,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, PlainSerializer
 from ...core.errors import ConfigError
 from ...core.specimen_file import MagnetModel
 from ...core.toml import FileModel, read_toml
-from ...sim.batch_shapes import Designs
+from ...sim.batch.shapes import Designs
 from ..feasible import falling_moduli, fitting_lengths
 
 Array = NDArray[np.float64]

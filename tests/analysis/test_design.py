@@ -26,7 +26,7 @@ from magbend.core.errors import ConfigError, InputError, SolverError
 from magbend.core.magnet import Magnet
 from magbend.core.specimen_file import read_specimen
 from magbend.sim import MagnetField, UniformField, gmc, solve
-from magbend.sim.batch_shapes import solve_shapes
+from magbend.sim.batch.shapes import solve_shapes
 
 FIELD = UniformField(flux_mT=50.0)
 FREE = Makeable()

@@ -12,7 +12,7 @@ from magbend.analysis.plan_preview import preview_plan
 from magbend.core.errors import InputError
 from magbend.core.magnet import Magnet
 from magbend.core.specimen import Section, Specimen
-from magbend.sim.magnet_fit import axis_share
+from magbend.sim.magnet.fit import axis_share
 
 GAPS_MM = (70.0, 60.0, 50.0)
 READINGS_MT = (38.0, 50.0, 66.0)

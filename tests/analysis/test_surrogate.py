@@ -23,7 +23,7 @@ from magbend.analysis.surrogate_tables import (
 from magbend.cli.main import app
 from magbend.core.errors import ConfigError, InputError, StoreError
 from magbend.sim import UniformField, gmc, solve
-from magbend.sim.batch_shapes import designs_of
+from magbend.sim.batch.shapes import designs_of
 
 
 @pytest.fixture(scope="module")

@@ -33,7 +33,7 @@ def test_a_command_says_that_it_was_stopped(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     code = interrupted(
-        monkeypatch, "magbend.sim.magnet_fit.fit_magnet", "sim", "magnet"
+        monkeypatch, "magbend.sim.magnet.fit.fit_magnet", "sim", "magnet"
     )
     assert code == 130
     out, err = capsys.readouterr()

@@ -94,7 +94,7 @@ def test_other_threads_keep_machine_code() -> None:
 
 
 def test_a_kernel_keeps_its_name_and_goes_to_other_processes() -> None:
-    from magbend.sim.planar_follow import newton
+    from magbend.sim.planar.follow import newton
 
     assert newton.__name__ == "newton"
     assert "equilibrium" in str(newton.__doc__)

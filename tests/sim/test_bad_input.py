@@ -23,12 +23,12 @@ from magbend.sim import (
     solve,
     solve_many,
 )
-from magbend.sim.batch_shapes import Designs, designs_of, solve_shapes
-from magbend.sim.check import verify
-from magbend.sim.equilibria import find_equilibria
+from magbend.sim.batch.shapes import Designs, designs_of, solve_shapes
+from magbend.sim.check.solver import verify
+from magbend.sim.equilibria.find import find_equilibria
 from magbend.sim.scaling import field_array, rod_array, stations
-from magbend.sim.spatial import SpatialRod, SpatialSection, solve_spatial
-from magbend.sim.sweep import sweep
+from magbend.sim.spatial.solver import SpatialRod, SpatialSection, solve_spatial
+from magbend.sim.study.sweep import sweep
 
 CUBE = Magnet.cube(55.0, 1.305)
 FIELD = UniformField(flux_mT=50.0)

@@ -11,7 +11,7 @@ from magbend.core.errors import InputError
 from magbend.core.magnet import Magnet
 from magbend.core.specimen import Section, Specimen
 from magbend.sim import MagnetField, UniformField, solve, solve_many
-from magbend.sim.batch import CHUNK, OUTCOMES
+from magbend.sim.batch.tips import CHUNK, OUTCOMES
 
 CUBE = Magnet.cube(55.0, 1.305)
 TABLE = {

@@ -9,7 +9,7 @@ from magbend.core.errors import InputError
 from magbend.core.magnet import Magnet
 from magbend.core.specimen import Section, Specimen
 from magbend.sim import MagnetField, UniformField, gmc, solve
-from magbend.sim.batch_shapes import STATUS, Designs, designs_of, solve_shapes
+from magbend.sim.batch.shapes import STATUS, Designs, designs_of, solve_shapes
 
 
 def random_designs(n: int, *, magnet: bool) -> Designs:

@@ -16,7 +16,7 @@ from magbend.core.centreline import Centreline
 from magbend.core.errors import ConfigError, InputError, SolverError
 from magbend.core.specimen_file import read_specimen
 from magbend.sim import UniformField, gmc
-from magbend.sim.sweep import STUDIES, sweep
+from magbend.sim.study.sweep import STUDIES, sweep
 
 SPECIMENS = Path(__file__).resolve().parents[2] / "fixtures" / "specimens"
 RUN = CliRunner()
@@ -204,7 +204,7 @@ def test_sweep_refuses_its_folder_before_it_solves(
     def began(*_: object, **__: object) -> None:
         raise AssertionError("the work began before --out was checked")
 
-    monkeypatch.setattr("magbend.sim.sweep.sweep", began)
+    monkeypatch.setattr("magbend.sim.study.sweep.sweep", began)
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="a file stands where a folder belongs"):
         run("sweep", "field", "--out", str(tmp_path / "file"))

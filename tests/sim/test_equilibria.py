@@ -17,10 +17,10 @@ from magbend.core.errors import InputError
 from magbend.core.specimen import Section, Specimen
 from magbend.core.units import MU0
 from magbend.sim import Support, UniformField, gmc
-from magbend.sim.check import check_solve
-from magbend.sim.equilibria import find_equilibria
-from magbend.sim.equilibria_folds import find_folds, trace_branches
-from magbend.sim.solve import solve
+from magbend.sim.check.solver import check_solve
+from magbend.sim.equilibria.find import find_equilibria
+from magbend.sim.equilibria.folds import find_folds, trace_branches
+from magbend.sim.one_rod import solve
 
 SIM = Path(__file__).parents[2] / "fixtures" / "sim"
 CASES = json.loads((SIM / "equilibria.json").read_text())

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from magbend.core.errors import InputError
 from magbend.core.magnet import Magnet
 from magbend.sim import magnet_flux_mT, magnet_gradient_mT_per_mm
-from magbend.sim.magnet_field import (
+from magbend.sim.magnet.field import (
     FAR,
     cuboid_flux,
     dipole_flux,

@@ -11,13 +11,13 @@ from scipy.special import stdtrit
 from magbend.core.errors import ConfigError, InputError
 from magbend.core.magnet import Magnet
 from magbend.sim import fit_magnet, magnet_flux_mT
-from magbend.sim.magnet_fit import (
+from magbend.sim.magnet.fit import (
     axis_flux_by_integral_mT,
     axis_share,
     paper_readings,
     read_readings,
 )
-from magbend.sim.student_t import student_t_95
+from magbend.sim.magnet.student_t import student_t_95
 
 
 def test_the_papers_readings() -> None:

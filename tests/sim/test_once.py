@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from magbend.core.jit import once
 from magbend.core.magnet import Magnet
 from magbend.sim import MagnetField, Support, UniformField, gmc, solve
-from magbend.sim.equilibria import find_equilibria
-from magbend.sim.equilibria_folds import trace_branches
+from magbend.sim.equilibria.find import find_equilibria
+from magbend.sim.equilibria.folds import trace_branches
 
 CUBE = Magnet.cube(55.0, 1.305)
 

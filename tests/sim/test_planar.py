@@ -27,9 +27,9 @@ from magbend.sim import (
     gmc,
     solve,
 )
-from magbend.sim.planar import GONE, solve_planar
-from magbend.sim.planar_follow import newton, straight
-from magbend.sim.planar_march import MAX_ORDER, STATE
+from magbend.sim.planar.follow import newton, straight
+from magbend.sim.planar.march import MAX_ORDER, STATE
+from magbend.sim.planar.solver import GONE, solve_planar
 from magbend.sim.scaling import field_array, rod_array
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures" / "sim"

@@ -28,13 +28,13 @@ from magbend.sim import (
     sensitivities,
     solve,
 )
-from magbend.sim.check import check_solve
+from magbend.sim.check.solver import check_solve
 from magbend.sim.fields import Field
-from magbend.sim.planar import GONE, OK_STABLE, solve_planar
-from magbend.sim.planar_follow import follow_load
-from magbend.sim.planar_swing import swing_index
+from magbend.sim.planar.follow import follow_load
+from magbend.sim.planar.solver import GONE, OK_STABLE, solve_planar
+from magbend.sim.planar.swing import swing_index
 from magbend.sim.scaling import field_array, rod_array, stations
-from magbend.sim.spatial import solve_spatial
+from magbend.sim.spatial.solver import solve_spatial
 
 
 def signed(low: float, high: float) -> st.SearchStrategy[float]:

@@ -22,7 +22,7 @@ from magbend.sim import (
     gmc,
     sensitivities,
 )
-from magbend.sim.planar import solve_planar
+from magbend.sim.planar.solver import solve_planar
 from magbend.sim.scaling import field_array, rod_array
 
 FIXTURES = Path(__file__).resolve().parents[2] / "fixtures" / "sim"

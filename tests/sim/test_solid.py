@@ -15,8 +15,8 @@ from magbend.core.errors import InputError
 from magbend.core.magnet import Magnet
 from magbend.core.specimen import Section, Specimen
 from magbend.sim import MagnetField, Support, UniformField, gmc
-from magbend.sim.solid import joint_turn, solid_constants, solve_solid
-from magbend.sim.solve import solve
+from magbend.sim.one_rod import solve
+from magbend.sim.solid.solver import joint_turn, solid_constants, solve_solid
 
 FEM = Path(__file__).parents[2] / "fixtures" / "fem"
 FILES = sorted(path.name for path in FEM.glob("*.csv"))

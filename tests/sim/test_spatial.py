@@ -17,13 +17,13 @@ from magbend.core.errors import InputError
 from magbend.core.magnet import Magnet
 from magbend.core.units import GRAVITY_M_PER_S2, MU0
 from magbend.sim import MagnetField, Support, UniformField, gmc
-from magbend.sim.magnet_field import magnet_flux_mT, magnet_gradient_mT_per_mm
+from magbend.sim.magnet.field import magnet_flux_mT, magnet_gradient_mT_per_mm
+from magbend.sim.one_rod import solve
 from magbend.sim.scaling import field_array
-from magbend.sim.solve import solve
-from magbend.sim.spatial import SpatialRod, SpatialSection, solve_spatial
-from magbend.sim.spatial_index import morse_index
-from magbend.sim.spatial_march import AXIAL, MU1, MU2, flux_at
-from magbend.sim.spatial_rod import rod_table, torsion_constant_mm4
+from magbend.sim.spatial.index import morse_index
+from magbend.sim.spatial.march import AXIAL, MU1, MU2, flux_at
+from magbend.sim.spatial.rod import rod_table, torsion_constant_mm4
+from magbend.sim.spatial.solver import SpatialRod, SpatialSection, solve_spatial
 
 SIM = Path(__file__).parents[2] / "fixtures" / "sim"
 CUBE = Magnet.cube(55.0, 1.305)

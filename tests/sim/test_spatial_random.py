@@ -19,8 +19,8 @@ from magbend.core.errors import InputError
 from magbend.core.magnet import Magnet
 from magbend.core.units import MU0
 from magbend.sim import PULLED_IN, MagnetField, Support
-from magbend.sim.magnet_field import magnet_flux_mT
-from magbend.sim.spatial import SpatialRod, SpatialSection, solve_spatial
+from magbend.sim.magnet.field import magnet_flux_mT
+from magbend.sim.spatial.solver import SpatialRod, SpatialSection, solve_spatial
 
 ORACLE_MM = 1e-8
 """What the oracle's own tolerances leave."""

@@ -1,0 +1,295 @@
+"""Whole shapes of many designs at once: the planar kernels in parallel, on all cores.
+
+Designs are columns of arrays, in mm, MPa, mT and degrees; the kernel is dimensionless
+as `planar_march`. No weight and no clamp angle: this is for searching designs, not for
+comparing with one bench.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.checks import finite, shown, store, whole
+from ...core.errors import InputError
+from ...core.magnet import Magnet
+from ...core.specimen import Specimen
+from ...core.units import MU0
+from ..magnet.field import magnet_block
+from ..planar.solver import GONE, OK_UNSTABLE, TOUCHES, solve_planar_rows
+from ..scaling import MOST_POINTS
+from .columns import COLUMNS, check_magnet, column
+
+Array = NDArray[np.float64]
+
+STATUS = ("stable", "unstable", "pulled in: no equilibrium", "not solved")
+"""Meaning of the codes in `Shapes.status`."""
+
+ORDER = 10
+STEP = 0.6
+_FIELD = 17
+ROWS_PER_CALL = 512
+"""Designs that one thread solves at a time; their shapes fit its cache."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Designs:
+    """Rods and fields, one a row: square sections, one remanence and side a rod.
+
+    Parameters
+    ----------
+    length_mm, E_MPa : ndarray, shape (n, sections)
+        Root first.
+    side_mm, remanence_mT : ndarray, shape (n,)
+    flux_mT : ndarray, shape (n,), or None
+        Uniform field; None before a magnet.
+    angle_deg : ndarray, shape (n,)
+        Direction of the uniform field; not used before a magnet.
+    magnet : Magnet or None
+    gap_mm : ndarray, shape (n,), or None
+        Gap of the magnet.
+
+    Raises
+    ------
+    InputError
+        If shapes disagree, a value is not finite or out of range (`COLUMNS`), or the
+        magnet is off the plane.
+    """
+
+    length_mm: Array
+    E_MPa: Array
+    side_mm: Array
+    remanence_mT: Array
+    flux_mT: Array | None = None
+    angle_deg: Array
+    magnet: Magnet | None = None
+    gap_mm: Array | None = None
+
+    def __post_init__(self) -> None:
+        if (self.flux_mT is None) == (self.magnet is None or self.gap_mm is None):
+            raise InputError(
+                "designs must have either flux_mT in mT, or a magnet and gap_mm in mm; "
+                f"instead received {'both' if self.flux_mT is not None else 'neither'}"
+            )
+        if self.magnet is not None:
+            check_magnet(self.magnet)
+        columns = {
+            name: column(name, values)
+            for name in COLUMNS
+            if (values := getattr(self, name)) is not None
+            or name not in ("flux_mT", "gap_mm")
+        }
+        n, sections = columns["side_mm"].size, columns["length_mm"].shape[-1:]
+        if sections in ((), (0,)):
+            raise InputError(
+                "designs: length_mm in mm must have a column for each section; instead "
+                f"received shape {columns['length_mm'].shape}"
+            )
+        for name, values in columns.items():
+            shape = (n, *sections) if name in ("length_mm", "E_MPa") else (n,)
+            if values.shape != shape:
+                raise InputError(
+                    f"designs: {name} in {COLUMNS[name][2]} must have {n} rows, shape "
+                    f"{shape}; instead received shape {values.shape}"
+                )
+        store(self, **columns)
+
+    def __len__(self) -> int:
+        return len(self.side_mm)
+
+
+def designs_of(
+    specimen: Specimen, flux_mT: float, *, angle_deg: float = 90.0
+) -> Designs:
+    """Return one specimen in a uniform field as a single design.
+
+    Raises
+    ------
+    InputError
+        If its sections differ in side or remanence.
+    """
+    if not isinstance(specimen, Specimen):
+        raise InputError(
+            f"specimen must be a Specimen; instead received {shown(specimen)}"
+        )
+    if len(set(specimen.sides_mm)) > 1 or len(set(specimen.remanences_mT)) > 1:
+        raise InputError(
+            f"specimen {specimen.name!r} must have one side_mm and one remanence_mT "
+            "for all sections to be a design; solve it with `magbend sim shape`"
+        )
+    sections = specimen.sections
+    return Designs(
+        length_mm=np.array([[section.length_mm for section in sections]]),
+        E_MPa=np.array([[section.E_MPa for section in sections]]),
+        side_mm=np.array([specimen.sides_mm[0]]),
+        remanence_mT=np.array([specimen.remanences_mT[0]]),
+        flux_mT=np.array([finite(flux_mT, "flux_mT", "mT")]),
+        angle_deg=np.array([finite(angle_deg, "angle_deg", "deg")]),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Shapes:
+    """What `solve_shapes` found.
+
+    Parameters
+    ----------
+    points : ndarray, shape (n, points, 5)
+        s, x, y in mm, theta in rad, kappa in 1/mm; NaN where there is no shape.
+    status : ndarray, shape (n,), int8
+        Index into `STATUS`.
+    error_mm : ndarray, shape (n,)
+        Bound of the numerical error of any point; NaN where there is no shape.
+    """
+
+    points: Array
+    status: NDArray[np.int8]
+    error_mm: Array
+
+
+def solve_shapes(
+    designs: Designs, *, points: int = 61, by_section: bool = False
+) -> Shapes:
+    """Solve every design and return its whole shape.
+
+    Parameters
+    ----------
+    designs : Designs
+    points : int
+        Points from clamp to tip.
+    by_section : bool
+        Instead of equal spacing over the rod, space the points equally within each
+        section, as many in each, so that every joint is one of them; `points` - 1 must
+        be a multiple of the number of sections.
+
+    Raises
+    ------
+    InputError
+        If these are no designs, or the number of points cannot be.
+
+    Notes
+    -----
+    Taylor order 10, corrected and bounded by order 14 (`planar`), on all cores.
+    """
+    if not isinstance(designs, Designs):
+        raise InputError(f"designs must be Designs; instead received {shown(designs)}")
+    points = whole(points, 2, MOST_POINTS, "points")
+    n, k = designs.length_mm.shape
+    total_mm = designs.length_mm.sum(axis=1)
+    side_m = designs.side_mm * 1e-3
+    EI = designs.E_MPa * 1e6 * side_m[:, None] ** 4 / 12.0
+    m = designs.remanence_mT * 1e-3 * side_m**2 / MU0
+    rods = np.zeros((n, k, 5))
+    rods[:, :, 0] = (designs.length_mm / total_mm[:, None])[:, ::-1]
+    rods[:, :, 1] = (EI[:, -1:] / EI)[:, ::-1]
+    rods[:, :, 2] = (m * (total_mm * 1e-3) ** 2 / EI[:, -1])[:, None]
+    margins = designs.side_mm / (2.0 * total_mm)
+    out = np.empty((n, points, 5))
+    status = np.empty(n, dtype=np.int8)
+    error = np.empty(n)
+    stations = np.linspace(0.0, 1.0, points)[None]
+    if by_section:
+        stations = _section_stations(rods[:, ::-1, 0], points)
+    stations = np.broadcast_to(stations, (n, points))
+    fields = _fields(designs, total_mm)
+    in_threads(_solve, stations, rods, fields, total_mm, margins, out, status, error)
+    return Shapes(points=out, status=status, error_mm=error)
+
+
+def _section_stations(share: Array, points: int) -> Array:
+    n, k = share.shape
+    each = (points - 1) // k
+    if each * k != points - 1 or each < 1:
+        raise InputError(
+            f"points - 1 must be a multiple of {k}, the number of sections; instead "
+            f"received {points}"
+        )
+    ends = np.cumsum(share, axis=1)
+    starts = ends - share
+    inside = np.arange(1, each + 1) / each
+    s = starts[:, :, None] + share[:, :, None] * inside
+    stations = np.concatenate([np.zeros((n, 1)), s.reshape(n, -1)], axis=1)
+    stations[:, -1] = 1.0
+    return stations
+
+
+def in_threads(kernel: Callable[..., None], *rows: NDArray) -> None:
+    """Call ``kernel(*slices)`` on slices of rows, on all cores.
+
+    The kernel must release the interpreter (``nogil``). Threads rather than numba's
+    parallel layer: that one compiles four times as long, aborts on concurrent calls
+    where it falls back, and does not survive a fork.
+    """
+    n = len(rows[0])
+    starts = range(0, n, ROWS_PER_CALL)
+
+    def call(start: int) -> None:
+        kernel(*(array[start : start + ROWS_PER_CALL] for array in rows))
+
+    if len(starts) <= 1:
+        for start in starts:
+            call(start)
+        return
+    with ThreadPoolExecutor(cores()) as pool:
+        for _ in pool.map(call, starts):
+            pass
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _fields(designs: Designs, total_mm: Array) -> Array:
+    fields = np.zeros((len(designs), _FIELD))
+    if designs.flux_mT is not None:
+        angle = np.radians(designs.angle_deg)
+        # Exact at the right angles, where rounding would make a straight rod bend.
+        fields[:, 1] = designs.flux_mT * 1e-3 * np.cos(angle)
+        fields[:, 2] = designs.flux_mT * 1e-3 * np.sin(angle)
+        fields[designs.angle_deg % 180.0 == 90.0, 1] = 0.0
+        fields[designs.angle_deg % 180.0 == 0.0, 2] = 0.0
+        return fields
+    if designs.magnet is None or designs.gap_mm is None:
+        raise InputError("designs must have either flux_mT, or a magnet and gap_mm")
+    fields[:, 0] = 1.0
+    block = magnet_block(designs.magnet, length_mm=0.0, gap_mm=0.0)
+    axis = np.array(designs.magnet.axes()[2])
+    fields[:, 1:] = block
+    fields[:, 4:7] -= designs.gap_mm[:, None] * axis
+    fields[:, 4] += total_mm
+    fields[:, 1:7] /= total_mm[:, None]
+    return fields
+
+
+def _solve(
+    stations: Array,
+    rods: Array,
+    fields: Array,
+    total: Array,
+    margins: Array,
+    out: Array,
+    status: NDArray[np.int8],
+    error: Array,
+) -> None:
+    found, curves, _ = solve_planar_rows(
+        rods, fields, 0.0, margins, stations, ORDER, STEP
+    )
+    outcome = found[:, 0].astype(np.int64)
+    good = outcome <= OK_UNSTABLE
+    gone = (outcome == GONE) | (outcome == TOUCHES)
+    status[:] = np.where(good, outcome, np.where(gone, 2, 3))
+    error[:] = np.where(good, found[:, 2] * total, np.nan)
+    out[:, :, 0] = stations * total[:, None]
+    out[:, :, 1] = curves[:, 0] * total[:, None]
+    out[:, :, 2] = curves[:, 1] * total[:, None]
+    out[:, :, 3] = curves[:, 2]
+    out[:, :, 4] = curves[:, 3] / total[:, None]
+    out[~good] = np.nan

@@ -1,0 +1,211 @@
+"""Energy, gradient and Hessian of a rod whose tangent angle is piecewise polynomial.
+
+Private to `check`, SI units: m, N, T. The magnetic and gravitational potentials are
+integrated along the rod with Gauss points; the position is the integral of the tangent
+with the same points, so that gradient and Hessian are those of the discrete energy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.errors import InputError
+from ...core.specimen import Specimen
+from ...core.units import MU0, rad_from_deg
+from ..fields import Field, Support, UniformField
+from ..magnet.field import magnet_flux_mT, magnet_gradient_mT_per_mm
+
+Array = NDArray[np.float64]
+
+PROBE_MM = 1e-3
+"""Step of the differences that give the Hessian the field's second derivatives."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Discretisation:
+    """Quadrature points root first, and what nodal angles do there (SI: m, N, T).
+
+    `angle` and `slope` (q, n) give theta and theta' at the points, `place` (q, q) the
+    integral from the root to each point; `weight` (q,) the quadrature weights.
+    """
+
+    s: Array
+    weight: Array
+    angle: Array
+    slope: Array
+    place: Array
+    EI: Array
+    m: Array
+    load: Array
+
+
+def lobatto(degree: int) -> Array:
+    """Gauss-Lobatto points: ends, and extrema of the Legendre polynomial."""
+    inner: Any = (
+        np.polynomial.Legendre.basis(degree).deriv().roots() if degree > 1 else []
+    )
+    return np.concatenate([[-1.0], np.real(inner), [1.0]])
+
+
+def lagrange(degree: int, xi: Array) -> tuple[Array, Array]:
+    """Values and derivatives of the nodal polynomials at `xi`, each (len, degree+1)."""
+    V = np.polynomial.legendre.legvander(lobatto(degree), degree)
+    inverse = np.linalg.inv(V)
+    values = np.polynomial.legendre.legvander(xi, degree) @ inverse
+    slopes = np.stack(
+        [
+            np.polynomial.legendre.legval(xi, np.polynomial.legendre.legder(row))
+            if degree
+            else np.zeros_like(xi)
+            for row in np.eye(degree + 1)
+        ],
+        axis=1,
+    )
+    return values, slopes @ inverse
+
+
+def node_places(mesh: Array, degree: int) -> Array:
+    """Return the arc lengths of the nodes of all elements, ends shared."""
+    local = 0.5 * (lobatto(degree) + 1.0)
+    parts = [a + (b - a) * local[:-1] for a, b in pairwise(mesh)]
+    return np.concatenate([*parts, mesh[-1:]])
+
+
+def discretise(
+    specimen: Specimen, support: Support, mesh: Array, degree: int
+) -> Discretisation:
+    """Return the rod on elements whose ends are `mesh`, in m."""
+    xi, w = np.polynomial.legendre.leggauss(degree + 8)
+    values, slopes = lagrange(degree, xi)
+    q, count = len(xi), len(mesh) - 1
+    inner = _integrals(xi)
+    angle = np.zeros((count * q, count * degree + 1))
+    slope, place = np.zeros_like(angle), np.zeros((count * q, count * q))
+    for e, h in enumerate(np.diff(mesh)):
+        rows, cols = slice(e * q, e * q + q), slice(e * degree, e * degree + degree + 1)
+        angle[rows, cols] = values
+        slope[rows, cols] = slopes * 2.0 / h
+        place[rows, rows] = inner * h / 2.0
+        place[e * q + q :, rows] = w * h / 2.0
+    weight = np.concatenate([w * h / 2.0 for h in np.diff(mesh)])
+    middle = np.repeat(0.5 * (mesh[1:] + mesh[:-1]), q)
+    joints = np.array(specimen.joints_mm) * 1e-3
+    which = np.searchsorted(joints, middle)
+    side = np.array(specimen.sides_mm)[which] * 1e-3
+    moduli = np.array([part.E_MPa for part in specimen.sections])[which] * 1e6
+    remanence = np.array(specimen.remanences_mT)[which] * 1e-3
+    s = (mesh[:-1, None] + np.diff(mesh)[:, None] * 0.5 * (xi + 1.0)).ravel()
+    return Discretisation(
+        s=s, weight=weight, angle=angle, slope=slope, place=place,
+        EI=moduli * side**4 / 12.0,
+        m=support.load_factor * side**2 * remanence / MU0,
+        load=_weight(specimen, support) * (side**2)[:, None],
+    )  # fmt: skip
+
+
+def _weight(specimen: Specimen, support: Support) -> Array:
+    gravity = np.array(support.gravity_m_s2[:2])
+    if not np.any(gravity):
+        return np.zeros(2)
+    if specimen.density_kg_m3 is None:
+        raise InputError(
+            f"specimen {specimen.name!r} must have a density_kg_m3 in kg/m3 for its "
+            "weight to be taken into account; instead received none"
+        )
+    weight: Array = specimen.density_kg_m3 * gravity
+    return weight
+
+
+def _integrals(xi: Array) -> Array:
+    """Integrate from -1 to each Gauss point: exact for the interpolating polynomial."""
+    n = len(xi)
+    inverse = np.linalg.inv(np.polynomial.legendre.legvander(xi, n - 1))
+    upper = np.stack(
+        [
+            np.polynomial.legendre.legval(
+                xi, np.polynomial.legendre.legint(row, lbnd=-1.0)
+            )
+            for row in np.eye(n)
+        ],
+        axis=1,
+    )
+    return upper @ inverse
+
+
+def _flux(field: Field, length_mm: float, r: Array) -> tuple[Array, Array]:
+    """B (q, 2) in T and dB_i/dx_j (q, 2, 2) in T/m at positions (q, 2) in m."""
+    if isinstance(field, UniformField):
+        angle = rad_from_deg(field.angle_deg)
+        b = field.flux_mT * 1e-3 * np.array([np.cos(angle), np.sin(angle)])
+        return np.tile(b, (len(r), 1)), np.zeros((len(r), 2, 2))
+    points = np.column_stack([r * 1e3, np.zeros(len(r))])
+    flux = magnet_flux_mT(
+        field.magnet, points, length_mm=length_mm, gap_mm=field.gap_mm
+    )
+    gradient = magnet_gradient_mT_per_mm(
+        field.magnet, points, length_mm=length_mm, gap_mm=field.gap_mm
+    )
+    return flux[:, :2] * 1e-3, gradient[:, :2, :2]
+
+
+def energy(
+    grid: Discretisation, field: Field, length_mm: float, theta: Array, load: float
+) -> tuple[float, Array, Array, Array]:
+    """Return energy, gradient by the nodal angles, positions and tip."""
+    a = grid.angle @ theta
+    bend = grid.slope @ theta
+    t = np.column_stack([np.cos(a), np.sin(a)])
+    n = np.column_stack([-t[:, 1], t[:, 0]])
+    r = grid.place @ t
+    B, G = _flux(field, length_mm, r)
+    m, w = load * grid.m, grid.weight
+    force = load * grid.load + m[:, None] * np.einsum("qi,qij->qj", t, G)
+    along = np.einsum("qi,qi->q", t, B)
+    total = w @ (0.5 * grid.EI * bend**2 - m * along)
+    total -= load * np.einsum("q,qi,qi->", w, grid.load, r)
+    # What pulls at the tangent of a point: its own torque, and all force beyond it.
+    beyond = grid.place.T @ (w[:, None] * force)
+    turn = w * m * np.einsum("qi,qi->q", n, B) + np.einsum("qi,qi->q", n, beyond)
+    gradient = grid.slope.T @ (w * grid.EI * bend) - grid.angle.T @ turn
+    return float(total), gradient, r, w @ t
+
+
+def hessian(
+    grid: Discretisation, field: Field, length_mm: float, theta: Array, load: float
+) -> Array:
+    """Return the second derivatives of the energy by the nodal angles."""
+    a = grid.angle @ theta
+    t = np.column_stack([np.cos(a), np.sin(a)])
+    n = np.column_stack([-t[:, 1], t[:, 0]])
+    r = grid.place @ t
+    B, G = _flux(field, length_mm, r)
+    m, w = load * grid.m, grid.weight
+    force = load * grid.load + m[:, None] * np.einsum("qi,qij->qj", t, G)
+    beyond = grid.place.T @ (w[:, None] * force)
+    H = grid.slope.T @ ((w * grid.EI)[:, None] * grid.slope)
+    own = w * m * np.einsum("qi,qi->q", t, B) + np.einsum("qi,qi->q", t, beyond)
+    H += grid.angle.T @ (own[:, None] * grid.angle)
+    if isinstance(field, UniformField):
+        return H
+    # dr = place (n dtheta); the field acts on it through G and its derivative.
+    move = [grid.place @ (n[:, i, None] * grid.angle) for i in range(2)]
+    wm = w * m
+    for i in range(2):
+        cross = np.einsum("qj,qj->q", n, G[:, :, i]) * wm
+        term = grid.angle.T @ (cross[:, None] * move[i])
+        H -= term + term.T
+    step = PROBE_MM * 1e-3
+    for i in range(2):
+        shift = np.zeros(2)
+        shift[i] = step
+        up = np.einsum("qj,qjk->qk", t, _flux(field, length_mm, r + shift)[1])
+        down = np.einsum("qj,qjk->qk", t, _flux(field, length_mm, r - shift)[1])
+        second = (up - down) / (2.0 * step)
+        for k in range(2):
+            H -= move[i].T @ ((wm * second[:, k])[:, None] * move[k])
+    return 0.5 * (H + H.T)

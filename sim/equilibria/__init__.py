@@ -1,0 +1,7 @@
+"""Every planar equilibrium of a rod, its stability, and the folds between."""
+
+from __future__ import annotations
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

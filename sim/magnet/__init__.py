@@ -1,0 +1,1 @@
+"""Fields of magnets: cuboid in closed form, remanence from readings."""

@@ -1,0 +1,166 @@
+"""`solve`: one rod, one field, one equilibrium."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core.centreline import Centreline
+from ..core.checks import shown, whole
+from ..core.errors import InputError, SolverError
+from ..core.specimen import Specimen
+from ..core.units import mT_from_T, rad_from_deg
+from .fields import (
+    PULLED_IN,
+    STABLE,
+    UNSTABLE,
+    Field,
+    Solution,
+    Support,
+    UniformField,
+    check_case,
+)
+from .planar.solver import GONE, ORDER, STEP, TOO_STRONG, TOUCHES, solve_planar
+from .planar.swing import swing_index
+from .scaling import MOST_POINTS, field_array, rod_array, stations, stiffness_Nmm2
+
+Array = NDArray[np.float64]
+STATUS = (STABLE, UNSTABLE, PULLED_IN)
+NO_SUPPORT = Support()
+
+
+def solve(
+    specimen: Specimen,
+    field: Field,
+    *,
+    support: Support = NO_SUPPORT,
+    model: str = "rod",
+    poisson_ratio: float = 0.49,
+    points: int = 61,
+) -> Solution:
+    """Return the equilibrium that the rod reaches when its load grows from zero.
+
+    Parameters
+    ----------
+    specimen : Specimen
+        The rod.
+    field : UniformField or MagnetField
+        What bends it.
+    support : Support
+        Clamp direction, weight, and a factor on the magnetic load.
+    model : {"rod", "solid"}
+        Plain inextensible rod, or a rod with shear, stretch and the clamped face of a
+        solid (`solid`).
+    poisson_ratio : float
+        Of the material; only the solid model knows it.
+    points : int
+        Number of points of the shape, equally spaced from clamp to tip.
+
+    Returns
+    -------
+    Solution
+        With its status, Morse index and error bound. "pulled in: no equilibrium" is a
+        result: the branch from zero load ends before the full load, or touches the
+        magnet.
+
+    Raises
+    ------
+    InputError
+        If a value cannot be, or the undeformed rod would touch the magnet.
+    SolverError
+        If no answer was found that could be vouched for.
+
+    Examples
+    --------
+    >>> from magbend.sim import UniformField, gmc, solve
+    >>> solution = solve(gmc(2), UniformField(flux_mT=50.0))
+    >>> [round(value, 5) for value in solution.centreline.tip_mm]
+    [29.53532, 4.70952]
+    """
+    check_case(specimen, field, support)
+    points = whole(points, 2, MOST_POINTS, "points")
+    if not isinstance(model, str) or model not in ("rod", "solid"):
+        raise InputError(
+            f"model must be 'rod' or 'solid'; instead received {shown(model)}"
+        )
+    if model == "solid":
+        from .solid.solver import solve_solid
+
+        return solve_solid(
+            specimen, field, support=support, poisson_ratio=poisson_ratio, points=points
+        )
+    if not (support.in_plane and (isinstance(field, UniformField) or field.in_plane)):
+        from .spatial.solver import solve_spatial
+
+        spatial = solve_spatial(specimen, field, support=support, points=points)
+        return spatial.seen_from_above()
+    rod, length_mm, margin, unit_Nm = _held(specimen, support)
+    s = stations(points)
+    flux = field_array(field, length_mm)
+    outcome, index, load, error, bx, by, moment, table, tip = solve_planar(
+        rod,
+        flux,
+        rad_from_deg(support.clamp_angle_deg),
+        margin,
+        s,
+        ORDER,
+        STEP,
+    )
+    if outcome > GONE:
+        raise failure(outcome, specimen, field, load)
+    centreline = stable_in_space = None
+    if outcome != GONE:
+        x, y, theta, kappa = table
+        centreline = Centreline._trusted(
+            s * length_mm, x * length_mm, y * length_mm, theta, kappa / length_mm
+        )
+        stable_in_space = index == 0 and swing_index(rod, flux, tip, STEP) == 0
+    return Solution(
+        centreline=centreline,
+        status=STATUS[outcome],
+        morse_index=index if centreline else -1,
+        error_mm=error * length_mm if centreline else math.nan,
+        flux_tip_mT=(mT_from_T(bx), mT_from_T(by)),
+        root_moment_Nm=moment * unit_Nm,
+        load_limit=load,
+        stable_in_space=stable_in_space,
+    )
+
+
+@lru_cache(maxsize=256)
+def _held(specimen: Specimen, support: Support) -> tuple[Array, float, float, float]:
+    """Return a held rod as the kernel takes it, and what turns its numbers into units.
+
+    The array, the length in mm, half the largest side over the length, and the unit of
+    moments in N m.
+    """
+    rod = rod_array(specimen, support)
+    length_mm = specimen.length_mm
+    margin = 0.5 * max(specimen.sides_mm) / length_mm
+    return rod, length_mm, margin, stiffness_Nmm2(specimen)[0] / length_mm * 1e-3
+
+
+def failure(
+    outcome: int, specimen: Specimen, field: Field, load: float
+) -> InputError | SolverError:
+    """Return the error that says why the kernel gave no answer."""
+    if outcome == TOUCHES:
+        gap_mm = getattr(field, "gap_mm", float("nan"))
+        return InputError(
+            f"gap_mm must leave the undeformed rod {specimen.name!r} clear of the "
+            f"magnet, with half its side to spare; instead received {gap_mm:g} mm"
+        )
+    if outcome == TOO_STRONG:
+        return InputError(
+            "the load on the rod (flux_mT, remanence_mT, weight) must be less than "
+            "1600 times its stiffness EI / L^2, or 40000 times in a uniform field "
+            "without weight; instead received one beyond it: check E_MPa, side_mm and "
+            "flux_mT"
+        )
+    return SolverError(
+        f"no equilibrium of {specimen.name!r} could be followed beyond "
+        f"{load:.3g} of its load; try a smaller flux_mT or a larger gap_mm"
+    )

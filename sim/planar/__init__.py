@@ -1,0 +1,1 @@
+"""Rods in the plane: marched from the tip, solved, followed from no load."""

@@ -1,0 +1,1 @@
+"""Exact derivatives of shapes by the implicit function theorem."""

@@ -1,0 +1,1 @@
+"""Rods with shear, stretch and the clamp's Poisson effect."""

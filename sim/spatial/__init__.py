@@ -1,0 +1,1 @@
+"""Rods in space: marched, solved, counted."""
