@@ -25,7 +25,7 @@ from ..core.specimen_file import MagnetModel, SpecimenModel
 from ..rig.config import BenchModel
 from ..rig.read_run import read_run
 from ..sim import Support
-from ..vision.calibration import Calibration
+from ..vision.camera.calibration import Calibration
 from ..vision.measurement import Pose
 
 if TYPE_CHECKING:

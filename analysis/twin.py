@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from ..core.magnet import Magnet, Vector
 from ..core.specimen import Specimen
 from ..sim import MagnetField, Solution, Support, magnet_flux_mT, solve
-from ..vision.board import Board
+from ..vision.camera.board import Board
 from ..vision.measurement import Pose
-from ..vision.scene import (
+from ..vision.synthetic.scene import (
     Block,
     Scene,
     SceneLight,

@@ -21,10 +21,10 @@ from ..rig.link import WireLog
 from ..rig.runner import RunSummary, run
 from ..rig.template import write_templates
 from ..rig.virtual.bench import open_twin
-from ..vision.batch import Settings, extract_files
-from ..vision.calibrate import calibrate
-from ..vision.calibration import Calibration
-from ..vision.photo import read_photo
+from ..vision.batch.run import Settings, extract_files
+from ..vision.camera.calibrate import calibrate
+from ..vision.camera.calibration import Calibration
+from ..vision.picture.photo import read_photo
 from .twin import TwinBench
 
 _SWING = {"swing_mm": 1.0, "swing_Hz": 2.0, "damping_s": 0.4}

@@ -18,7 +18,7 @@ def is_warm() -> bool:
     """Return whether the largest kernels are in the cache, so that nothing compiles."""
     from ..sim.planar.solver import solve_rows
     from ..sim.solid.newton import solve_shape
-    from ..vision.edges import _sample
+    from ..vision.edge.edges import _sample
 
     return all(kernel.is_stored for kernel in (solve_rows, solve_shape, _sample))
 
@@ -51,7 +51,7 @@ def _photograph() -> None:
     from ..core.centreline import Centreline
     from ..vision import as_photo, extract
     from ..vision.measurement import Pose
-    from ..vision.scene import Block, Scene, render_scene, scene_camera
+    from ..vision.synthetic.scene import Block, Scene, render_scene, scene_camera
     from . import metrics
 
     s = np.linspace(0.0, 30.0, 121)

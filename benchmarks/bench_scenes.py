@@ -26,7 +26,8 @@ from magbend.vision import (
     extract,
     specimen_to_px,
 )
-from magbend.vision.scene import (
+from magbend.vision.synthetic.frames import curve
+from magbend.vision.synthetic.scene import (
     BLACK,
     BLUE,
     GREY,
@@ -36,8 +37,7 @@ from magbend.vision.scene import (
     render_scene,
     scene_camera,
 )
-from magbend.vision.score import signed_distance
-from magbend.vision.synthetic import curve
+from magbend.vision.synthetic.score import signed_distance
 
 COLOURS = {"grey": GREY, "blue": BLUE, "black": BLACK}
 

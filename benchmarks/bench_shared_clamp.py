@@ -21,10 +21,10 @@ from magbend.analysis.twin import TwinBench
 from magbend.core.magnet import Magnet
 from magbend.sim import gmc
 from magbend.vision import Calibration, Measurement, Pose, as_photo, extract
-from magbend.vision.scene import Scene, render_scene
-from magbend.vision.score import signed_distance
-from magbend.vision.shared_clamp import Reading, shared_direction
-from magbend.vision.synthetic import curve
+from magbend.vision.batch.shared_clamp import Reading, shared_direction
+from magbend.vision.synthetic.frames import curve
+from magbend.vision.synthetic.scene import Scene, render_scene
+from magbend.vision.synthetic.score import signed_distance
 
 Shot = tuple[Measurement, np.ndarray, float]
 """A measurement, the true axis in the clamp's frame, mm, and the true direction."""

@@ -20,8 +20,8 @@ import cv2
 import numpy as np
 
 from magbend.vision import Settings, extract, extract_files, read_photo
-from magbend.vision.overlay import overlay_png
-from magbend.vision.synthetic import LIGHTS, SHAPES, curve, draw
+from magbend.vision.batch.overlay import overlay_png
+from magbend.vision.synthetic.frames import LIGHTS, SHAPES, curve, draw
 
 
 def write_frames(folder: Path, count: int):

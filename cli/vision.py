@@ -14,10 +14,10 @@ from ..core.errors import InputError
 from .console import JSON, group, print_json, progress
 
 if TYPE_CHECKING:
-    from ..vision.batch import Settings
-    from ..vision.board import Board
-    from ..vision.calibration import Calibration
-    from ..vision.tables import FrameRow
+    from ..vision.batch.run import Settings
+    from ..vision.batch.tables import FrameRow
+    from ..vision.camera.board import Board
+    from ..vision.camera.calibration import Calibration
 
 app = group(
     "vision",
@@ -42,8 +42,8 @@ def board(
 ) -> None:
     """Write the ChArUco board to print."""
     from ..core.files import output_file
-    from ..vision.board import Board
-    from ..vision.board_print import write_board
+    from ..vision.camera.board import Board
+    from ..vision.camera.board_print import write_board
 
     columns, rows = _two_numbers(squares, "--board")
     output_file(out)
@@ -105,8 +105,8 @@ def calibrate(
 ) -> None:  # fmt: skip
     """Calibrate a camera from photographs of the board."""
     from ..core.files import output_file
-    from ..vision.calibrate import calibrate as calibrate_photos
-    from ..vision.photo import read_photo
+    from ..vision.camera.calibrate import calibrate as calibrate_photos
+    from ..vision.picture.photo import read_photo
 
     output_file(out)
     if known_length or scale_mm_per_px is not None:
@@ -203,9 +203,9 @@ def extract(
 ) -> None:  # fmt: skip
     """Measure the rod's centreline in photographs."""
     from ..core.files import output_file, output_folder
-    from ..vision.batch import extract_files
-    from ..vision.figures import figure_kind
-    from ..vision.inputs import list_sources
+    from ..vision.batch.figures import figure_kind
+    from ..vision.batch.inputs import list_sources
+    from ..vision.batch.run import extract_files
 
     if figure_steps is not None:
         figure_kind(figure_steps)
@@ -245,8 +245,8 @@ def extract(
             progress=report,
         )
     if figure_steps is not None:
-        from ..vision.figures import figure_of_steps
-        from ..vision.inputs import read_source
+        from ..vision.batch.figures import figure_of_steps
+        from ..vision.batch.inputs import read_source
 
         index = next(i for i, frame in enumerate(result.frames) if frame.ok)
         figure_of_steps(read_source(sources[index]), settings, figure_steps)
@@ -279,7 +279,7 @@ def _design(
     columns: int, rows: int, square_mm: float, marker_mm: float, dictionary: str,
     print_scale: float, *, legacy: bool, plain: bool,
 ) -> Board:  # fmt: skip
-    from ..vision.board import Board
+    from ..vision.camera.board import Board
 
     return Board(
         kind="chessboard" if plain else "charuco",
@@ -301,9 +301,9 @@ def _without_board(
     rod_height_mm: float,
 ) -> Calibration:
     from ..core.checks import positive
-    from ..vision.calibrate import calibrate_known_length
-    from ..vision.calibration import scale_calibration
-    from ..vision.photo import read_photo
+    from ..vision.camera.calibrate import calibrate_known_length
+    from ..vision.camera.calibration import scale_calibration
+    from ..vision.picture.photo import read_photo
 
     size_px = read_photo(plane).size_px
     if scale_mm_per_px is not None:
@@ -394,8 +394,8 @@ def _settings(
     **others: Any,
 ) -> Settings:
     from ..core.checks import finite, positive
-    from ..vision.batch import Settings, read_bare
-    from ..vision.calibration import Calibration
+    from ..vision.batch.run import Settings, read_bare
+    from ..vision.camera.calibration import Calibration
 
     known = None if calibration is None else Calibration.load(calibration)
     given: dict[str, Any] = {

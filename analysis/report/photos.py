@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...vision.calibration import specimen_to_px
+from ...vision.camera.calibration import specimen_to_px
 from ..compare import Comparison, RunComparison
 
 Array = NDArray[np.float64]

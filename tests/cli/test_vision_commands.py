@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from magbend.cli import main as cli
-from magbend.vision.calibration import Calibration
-from magbend.vision.score import signed_distance
-from magbend.vision.tables import read_centrelines, read_frames, to_centreline
+from magbend.vision.batch.tables import read_centrelines, read_frames, to_centreline
+from magbend.vision.camera.calibration import Calibration
+from magbend.vision.synthetic.score import signed_distance
 
 FIXTURES = Path(__file__).parents[2] / "fixtures" / "vision"
 RENDERED = FIXTURES / "rendered"
@@ -40,9 +40,9 @@ def magbend(monkeypatch, capsys):
 
 @pytest.fixture(scope="module")
 def calibration(tmp_path_factory) -> Path:
-    from magbend.vision.board import Board
-    from magbend.vision.calibrate import calibrate
-    from magbend.vision.photo import read_photo
+    from magbend.vision.camera.board import Board
+    from magbend.vision.camera.calibrate import calibrate
+    from magbend.vision.picture.photo import read_photo
 
     path = tmp_path_factory.mktemp("camera") / "calibration.json"
     calibrate(read_photo(BOARD), board=Board()).save(path)

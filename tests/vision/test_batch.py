@@ -13,19 +13,19 @@ import pytest
 from PIL import Image
 
 from magbend.core.errors import VisionError
-from magbend.vision.batch import (
+from magbend.vision.batch.overlay import draw_overlay
+from magbend.vision.batch.run import (
     Settings,
     _single_threaded_children,
     extract_files,
     read_bare,
 )
-from magbend.vision.calibration import scale_calibration
+from magbend.vision.batch.tables import read_centrelines, read_frames, to_centreline
+from magbend.vision.camera.calibration import scale_calibration
 from magbend.vision.measurement import POINT_COLUMNS, failure
-from magbend.vision.overlay import draw_overlay
-from magbend.vision.photo import Photo, read_photo
-from magbend.vision.score import signed_distance
-from magbend.vision.synthetic import CLEAN, curve, draw
-from magbend.vision.tables import read_centrelines, read_frames, to_centreline
+from magbend.vision.picture.photo import Photo, read_photo
+from magbend.vision.synthetic.frames import CLEAN, curve, draw
+from magbend.vision.synthetic.score import signed_distance
 
 SIZE = (900, 640)
 SCALE = 16.0
@@ -425,7 +425,7 @@ def test_a_dying_worker_does_not_lose_the_batch(tmp_path, folder, monkeypatch):
         def shutdown(self, **_options):
             pass
 
-    monkeypatch.setattr("magbend.vision.batch.ProcessPoolExecutor", Dying)
+    monkeypatch.setattr("magbend.vision.batch.run.ProcessPoolExecutor", Dying)
     result = extract_files([folder], tmp_path / "out", settings=SETTINGS, workers=2)
     assert [row.status for row in result.frames] == ["failed", "ok", "ok"]
 
@@ -437,7 +437,7 @@ def test_overlay_of_a_large_photograph_is_made_smaller():
 
 
 def test_overlay_draws_the_axis_where_the_rod_is(tmp_path, good):
-    from magbend.vision.extract import extract
+    from magbend.vision.extraction.extract import extract
 
     photo = read_photo(save(tmp_path / "x.png", good.image))
     found = extract(photo, CALIBRATION)

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from magbend.core.errors import InputError, VisionError
-from magbend.vision.board import Board, find_corners
-from magbend.vision.board_print import write_board
-from magbend.vision.photo import as_photo
-from magbend.vision.scene import render_board, scene_camera
+from magbend.vision.camera.board import Board, find_corners
+from magbend.vision.camera.board_print import write_board
+from magbend.vision.picture.photo import as_photo
+from magbend.vision.synthetic.scene import render_board, scene_camera
 
 DESIGNS = [
     Board(),

@@ -13,12 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from magbend.core.errors import ConfigError, InputError, VisionError
-from magbend.vision.board import Board
-from magbend.vision.calibrate import calibrate, calibrate_known_length
-from magbend.vision.calibration import Calibration, scale_calibration, specimen_to_px
+from magbend.vision.camera.board import Board
+from magbend.vision.camera.calibrate import calibrate, calibrate_known_length
+from magbend.vision.camera.calibration import (
+    Calibration,
+    scale_calibration,
+    specimen_to_px,
+)
 from magbend.vision.measurement import Pose
-from magbend.vision.photo import Photo, as_photo, read_photo
-from magbend.vision.scene import render_board, scene_camera
+from magbend.vision.picture.photo import Photo, as_photo, read_photo
+from magbend.vision.synthetic.scene import render_board, scene_camera
 
 FIXTURES = Path(__file__).parents[2] / "fixtures" / "vision" / "rendered"
 BOARD = Board()

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from magbend.vision.centreline_fit import fit_curve
-from magbend.vision.spline import Smooth, design, knots_between, penalty_on_moment
+from magbend.vision.curve.fit import fit_curve
+from magbend.vision.curve.spline import Smooth, design, knots_between, penalty_on_moment
 
 
 def arc(length: float, turn: float, step: float = 1.0) -> tuple[np.ndarray, np.ndarray]:

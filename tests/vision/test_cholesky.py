@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from magbend.vision.cholesky import factor, inverse, solved, solved_half, squared
-from magbend.vision.robust import median, quantile
+from magbend.vision.curve.cholesky import factor, inverse, solved, solved_half, squared
+from magbend.vision.curve.robust import median, quantile
 
 
 @settings(max_examples=20, deadline=None)

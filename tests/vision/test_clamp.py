@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from magbend.vision.clamp import find_clamp
-from magbend.vision.curve import Curve
+from magbend.vision.curve.curve import Curve
+from magbend.vision.edge.clamp import find_clamp
 
 ROD, PAPER, TOP = 0.03, 0.6, 0.3
 

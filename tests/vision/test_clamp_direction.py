@@ -5,8 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from magbend.vision import Measurement, Pose, as_photo, extract
-from magbend.vision.scene import Block, Scene, SceneLight, render_scene, scene_camera
-from magbend.vision.synthetic import curve
+from magbend.vision.synthetic.frames import curve
+from magbend.vision.synthetic.scene import (
+    Block,
+    Scene,
+    SceneLight,
+    render_scene,
+    scene_camera,
+)
 
 HEIGHT_MM, TOP_MM = 0.9, 4.0
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
-from magbend.vision.binarise import binarise
-from magbend.vision.edges import _bilinear, find_edges
-from magbend.vision.rough_edges import rough_edges
+from magbend.vision.edge.edges import _bilinear, find_edges
+from magbend.vision.edge.rough_edges import rough_edges
+from magbend.vision.find.binarise import binarise
 
 
 def bar(

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from magbend.vision import Pose, as_photo, extract, read_photo, score
-from magbend.vision.calibration import Calibration
-from magbend.vision.scene import (
+from magbend.vision.camera.calibration import Calibration
+from magbend.vision.synthetic.frames import HARD, STANDARD, curve, draw
+from magbend.vision.synthetic.scene import (
     BLACK,
     BLUE,
     Block,
@@ -22,8 +23,7 @@ from magbend.vision.scene import (
     render_scene,
     scene_camera,
 )
-from magbend.vision.score import signed_distance
-from magbend.vision.synthetic import HARD, STANDARD, curve, draw
+from magbend.vision.synthetic.score import signed_distance
 
 FIXTURES = Path(__file__).parents[2] / "fixtures" / "vision"
 SIZE = (1200, 1000)

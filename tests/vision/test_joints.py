@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from magbend.vision import joints
-from magbend.vision.joints import find_joints
+from magbend.vision.curve import joints
+from magbend.vision.curve.joints import find_joints
 
 WIDTH = 20.0
 SHARED = 8.0

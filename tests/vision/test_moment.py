@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
-from magbend.vision.centreline_fit import solve
-from magbend.vision.moment import weighed_fit
-from magbend.vision.problem import pose
-from magbend.vision.spline import Smooth, design, knots_between, penalty_on_moment
+from magbend.vision.curve.fit import solve
+from magbend.vision.curve.moment import weighed_fit
+from magbend.vision.curve.problem import pose
+from magbend.vision.curve.spline import Smooth, design, knots_between, penalty_on_moment
 
 JOINTS = (200.0, 400.0)
 S = np.arange(0.0, 601.0, 4.0)

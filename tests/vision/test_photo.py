@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from magbend.core.errors import VisionError
-from magbend.vision.photo import MAX_PIXELS, as_photo, decode_photo, read_photo
+from magbend.vision.picture.photo import MAX_PIXELS, as_photo, decode_photo, read_photo
 
 RAMP = np.tile(np.arange(256, dtype=np.uint8), (64, 1))
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from magbend.vision.centreline_fit import solve
-from magbend.vision.problem import moved, pose
-from magbend.vision.spline import Smooth, penalty_on_moment
+from magbend.vision.curve.fit import solve
+from magbend.vision.curve.problem import moved, pose
+from magbend.vision.curve.spline import Smooth, penalty_on_moment
 
 S = np.arange(0.0, 601.0, 4.0)
 JOINTS = (200.0, 400.0)

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from magbend.vision import as_photo, extract
-from magbend.vision.binarise import binarise
-from magbend.vision.calibration import scale_calibration
-from magbend.vision.curve import Curve
+from magbend.vision.camera.calibration import scale_calibration
+from magbend.vision.curve.curve import Curve
+from magbend.vision.extraction.quality import _goes_on, doubts
+from magbend.vision.extraction.refine import refine
+from magbend.vision.extraction.specimen_frame import Setting
+from magbend.vision.find.binarise import binarise
+from magbend.vision.find.rod import find_candidates
+from magbend.vision.find.track import start_curve
 from magbend.vision.measurement import Measurement
-from magbend.vision.quality import _goes_on, doubts
-from magbend.vision.refine import refine
-from magbend.vision.rod import find_candidates
-from magbend.vision.specimen_frame import Setting
-from magbend.vision.synthetic import curve, draw
-from magbend.vision.track import start_curve
+from magbend.vision.synthetic.frames import curve, draw
 
 
 def measured(seed=0):

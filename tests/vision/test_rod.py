@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 import pytest
 
-from magbend.vision.binarise import Binary
-from magbend.vision.rod import find_candidates
+from magbend.vision.find.binarise import Binary
+from magbend.vision.find.rod import find_candidates
 
 
 def things(*boxes: tuple[int, int, int, int]) -> np.ndarray:

@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
-from magbend.vision.batch import Settings, extract_files
-from magbend.vision.calibration import scale_calibration
-from magbend.vision.synthetic import CLEAN, curve, draw
-from magbend.vision.tables import read_centrelines, read_frames
+from magbend.vision.batch.run import Settings, extract_files
+from magbend.vision.batch.tables import read_centrelines, read_frames
+from magbend.vision.camera.calibration import scale_calibration
+from magbend.vision.synthetic.frames import CLEAN, curve, draw
 
 SIZE, SCALE, HEADING = (900, 640), 16.0, 5.0
 SETTINGS = Settings(

@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from magbend.vision import scene as scene_module
-from magbend.vision.calibration import specimen_to_px
+from magbend.vision.camera.calibration import specimen_to_px
 from magbend.vision.measurement import Pose
-from magbend.vision.photo import as_photo
-from magbend.vision.scene import (
+from magbend.vision.picture.photo import as_photo
+from magbend.vision.synthetic import scene as scene_module
+from magbend.vision.synthetic.frames import curve
+from magbend.vision.synthetic.scene import (
     BLACK,
     BLUE,
     GREY,
@@ -21,7 +22,6 @@ from magbend.vision.scene import (
     render_scene,
     scene_camera,
 )
-from magbend.vision.synthetic import curve
 
 CLAMP = Block(pose=Pose(x_mm=15.0, y_mm=-24.0, angle_deg=3.0, height_mm=0.9))
 QUIET = SceneLight(noise=0.0, blur_px=0.3)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import nnls
 
-from magbend.vision.shared_clamp import (
+from magbend.vision.batch.shared_clamp import (
     ALIKE,
     DISAGREE,
     OUTLIER,

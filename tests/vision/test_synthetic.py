@@ -10,19 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from magbend.core.errors import InputError
-from magbend.vision.extract import extract
+from magbend.vision.extraction.extract import extract
 from magbend.vision.measurement import Measurement, failure
-from magbend.vision.photo import as_photo
-from magbend.vision.raster import coverage, coverage_of
-from magbend.vision.score import score, signed_distance
-from magbend.vision.synthetic import (
-    LIGHTS,
-    SHAPES,
-    Light,
-    curve,
-    draw,
-    frames,
-)
+from magbend.vision.picture.photo import as_photo
+from magbend.vision.picture.raster import coverage, coverage_of
+from magbend.vision.synthetic.frames import LIGHTS, SHAPES, Light, curve, draw, frames
+from magbend.vision.synthetic.score import score, signed_distance
 
 PLAIN = Light(gradient=0.0, blur_px=0.0, noise=0.0)
 

@@ -9,10 +9,10 @@ import pytest
 from scipy.special import erf
 
 from magbend.vision import as_photo, extract
-from magbend.vision.clamp import ClampLines, between
-from magbend.vision.score import signed_distance
-from magbend.vision.synthetic import CLEAN, curve, draw
-from magbend.vision.tip import EndFace, crossings_of, fit_step, line_through
+from magbend.vision.edge.clamp import ClampLines, between
+from magbend.vision.edge.tip import EndFace, crossings_of, fit_step, line_through
+from magbend.vision.synthetic.frames import CLEAN, curve, draw
+from magbend.vision.synthetic.score import signed_distance
 
 S = np.arange(-16.0, 16.0, 0.5)
 ACROSS = np.linspace(-6.0, 6.0, 13)

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from magbend.core.centreline import Centreline
-from magbend.vision import as_photo, edges, extract, scene, wall_light
+from magbend.vision import as_photo, extract
+from magbend.vision.edge import edges, wall_light
+from magbend.vision.edge.wall_light import short_of_end
 from magbend.vision.measurement import Pose
-from magbend.vision.wall_light import short_of_end
+from magbend.vision.synthetic import scene
 
 S = np.linspace(0.0, 30.0, 301)
 ZERO = np.zeros_like(S)

@@ -1,0 +1,1 @@
+"""Many photographs to tables."""

@@ -1,0 +1,1 @@
+"""From pixels to mm: projection, calibration, boards."""

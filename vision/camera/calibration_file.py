@@ -1,0 +1,127 @@
+"""``calibration.json``: what a `Calibration` is on the disk."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from ...core.files import write_text
+from ...core.toml import FileModel, read_toml
+from .calibration import Calibration, View
+
+Pair = tuple[float, float]
+Positive = Annotated[float, Field(gt=0.0)]
+Triple = tuple[float, float, float]
+
+
+class ViewModel(FileModel):
+    """One photograph of the board."""
+
+    name: str
+    rms_px: float | None
+    corners: int
+    used: bool
+    why_not: str = ""
+
+
+class CalibrationModel(FileModel):
+    """The file's keys; see `Calibration` for what they mean."""
+
+    schema_version: Literal[1] = Field(1, alias="schema")
+    image_size_px: tuple[int, int]
+    focal_px: tuple[Positive, Positive]
+    centre_px: Pair
+    distortion: tuple[float, float, float, float, float]
+    board_to_camera_rotation: tuple[Triple, Triple, Triple]
+    board_to_camera_mm: Triple
+    camera_height_mm: float
+    camera_height_sd_mm: float | None
+    camera_height_source: str
+    tilt_deg: float
+    scale_relative_sd: float | None
+    rms_px: float | None
+    rod_height_mm: float = 0.0
+    print_scale: float = 1.0
+    board: str = ""
+    views: tuple[ViewModel, ...] = ()
+
+
+def save_calibration(calibration: Calibration, path: Path) -> None:
+    """Write `calibration` as JSON, whole or not at all."""
+    data = {
+        "schema": 1,
+        "image_size_px": list(calibration.image_size_px),
+        "focal_px": list(calibration.focal_px),
+        "centre_px": list(calibration.centre_px),
+        "distortion": list(calibration.distortion),
+        "board_to_camera_rotation": calibration.rotation.tolist(),
+        "board_to_camera_mm": calibration.translation_mm.tolist(),
+        "camera_height_mm": calibration.camera_height_mm,
+        "camera_height_sd_mm": _number(calibration.camera_height_sd_mm),
+        "camera_height_source": calibration.camera_height_source,
+        "tilt_deg": calibration.tilt_deg,
+        "scale_relative_sd": _number(calibration.scale_relative_sd),
+        "rms_px": _number(calibration.rms_px),
+        "rod_height_mm": calibration.rod_height_mm,
+        "print_scale": calibration.print_scale,
+        "board": calibration.board,
+        "views": [
+            {
+                "name": view.name, "rms_px": _number(view.rms_px),
+                "corners": view.corners, "used": view.used, "why_not": view.why_not,
+            }
+            for view in calibration.views
+        ],
+    }  # fmt: skip
+    write_text(path, json.dumps(data, indent=2, allow_nan=False) + "\n")
+
+
+def load_calibration(path: Path) -> Calibration:
+    """Read what `save_calibration` wrote.
+
+    Raises
+    ------
+    ConfigError
+        If the file is missing or a key is missing, unknown or impossible.
+    InputError
+        If the numbers do not make a camera.
+    """
+    model = read_toml(path, CalibrationModel)
+    return Calibration(
+        image_size_px=model.image_size_px,
+        focal_px=model.focal_px,
+        centre_px=model.centre_px,
+        distortion=model.distortion,
+        rotation=np.array(model.board_to_camera_rotation),
+        translation_mm=np.array(model.board_to_camera_mm),
+        camera_height_sd_mm=_or(model.camera_height_sd_mm, math.inf),
+        camera_height_source=model.camera_height_source,
+        scale_relative_sd=_or(model.scale_relative_sd, math.nan),
+        rms_px=_or(model.rms_px, math.nan),
+        rod_height_mm=model.rod_height_mm,
+        print_scale=model.print_scale,
+        board=model.board,
+        views=tuple(
+            View(
+                name=view.name,
+                rms_px=_or(view.rms_px, math.nan),
+                corners=view.corners,
+                used=view.used,
+                why_not=view.why_not,
+            )
+            for view in model.views
+        ),
+    )
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _or(value: float | None, missing: float) -> float:
+    return missing if value is None else value

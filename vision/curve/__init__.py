@@ -1,0 +1,1 @@
+"""Curves and their fit: splines, likelihood, joints."""

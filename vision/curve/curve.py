@@ -1,0 +1,81 @@
+"""A plane curve on an even grid of arc length, in pixels and radians (y down)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.jit import njit
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Curve:
+    """A fitted curve on an even grid of arc length.
+
+    Parameters
+    ----------
+    s : ndarray, shape (n,)
+        Arc length.
+    points : ndarray, shape (n, 2)
+        Position (x, y).
+    theta, kappa : ndarray, shape (n,)
+        Tangent angle, unwrapped, and its derivative.
+    """
+
+    s: Array
+    points: Array
+    theta: Array
+    kappa: Array
+
+    @property
+    def tangents(self) -> Array:
+        """Unit tangents, shape (n, 2)."""
+        tangents = np.empty((len(self.theta), 2))
+        np.cos(self.theta, out=tangents[:, 0])
+        np.sin(self.theta, out=tangents[:, 1])
+        return tangents
+
+    @property
+    def normals(self) -> Array:
+        """Unit normals to the right in the picture (y down), shape (n, 2)."""
+        normals = np.empty((len(self.theta), 2))
+        np.negative(np.sin(self.theta), out=normals[:, 0])
+        np.cos(self.theta, out=normals[:, 1])
+        return normals
+
+    def at(self, s: Array) -> tuple[Array, Array]:
+        """Return points (n, 2) and angles (n,) at any s; beyond the ends an arc."""
+        s = np.ascontiguousarray(s, dtype=np.float64)
+        points, theta = np.empty((len(s), 2)), np.empty(len(s))
+        _evaluate(s, self.s, self.points, self.theta, self.kappa, points, theta)
+        return points, theta
+
+
+@njit(cache=True)
+def _evaluate(
+    at: Array, s: Array, points: Array, theta: Array, kappa: Array,
+    out: Array, angle: Array,
+) -> None:  # fmt: skip
+    """Points and angles of a curve: curvature linear between stations."""
+    last = s.size - 1
+    step = s[1] - s[0]
+    for i in range(at.size):
+        inside = min(max(at[i], s[0]), s[last])
+        place = (inside - s[0]) / step
+        k = min(max(int(place), 0), last - 1)
+        u = (place - k) * step
+        slope = (kappa[k + 1] - kappa[k]) / step
+        middle = theta[k] + 0.5 * u * (kappa[k] + 0.25 * slope * u)
+        turned = theta[k] + u * (kappa[k] + 0.5 * slope * u)
+        x, y = points[k, 0] + u * np.cos(middle), points[k, 1] + u * np.sin(middle)
+        beyond = at[i] - inside
+        if beyond != 0.0:
+            bend = kappa[last] if beyond > 0.0 else kappa[0]
+            middle = turned + 0.5 * beyond * bend
+            x, y = x + beyond * np.cos(middle), y + beyond * np.sin(middle)
+            turned += beyond * bend
+        out[i, 0], out[i, 1], angle[i] = x, y, turned

@@ -1,0 +1,295 @@
+"""A centreline as theta(s): cubic B-spline, inextensible by build, honest about itself.
+
+The curve is p(s) = p0 + integral of (cos theta, sin theta), so its parameter is arc
+length without any later correction. Measured points pull along the normal only. Knots
+are dense (about one a rod width); what keeps the fit smooth is a penalty on changes of
+the bending moment (`spline.Smooth`; one that changes evenly, as at the root, is left
+alone), whose weight is the most likely one (restricted maximum likelihood, Wood 2011).
+Joints get triple knots: theta is continuous there and the curvature may jump. The
+covariance is the Bayesian one of Wahba (1983), which covers the bias of smoothing on
+average, widened by the correlation seen in the residuals.
+
+Units here are pixels and radians of the picture (y down).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.jit import njit
+from .cholesky import factor, inverse, solved, squared
+from .curve import Curve
+from .likelihood import penalised
+from .problem import SHARED, Problem, linearised, moved, parameters, pose
+from .spline import Smooth, penalty_on_moment
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CurveFit:
+    """A curve with the uncertainty of everything that follows from it.
+
+    Parameters
+    ----------
+    curve : Curve
+        The curve.
+    residual : ndarray, shape (n,)
+        Normal distance of the measured points; NaN where there is none.
+    noise : float
+        Standard deviation of a measurement.
+    correlation : float
+        Factor by which correlated residuals widen variances.
+    freedom : float
+        Effective number of parameters.
+    problem : Problem
+        What was fitted.
+    change : ndarray, shape (p,)
+        The parameters.
+    covariance : ndarray, shape (p, p)
+        Their covariance.
+    lever : ndarray, shape (n,)
+        By how much a measured point turns the root, rad per px along its normal.
+    """
+
+    curve: Curve
+    residual: Array
+    noise: float
+    correlation: float
+    freedom: float
+    problem: Problem
+    change: Array
+    covariance: Array
+    lever: Array
+
+    @property
+    def sigma(self) -> Array:
+        """Standard deviation of the normal position, shape (n,)."""
+        jacobian = self.problem.jacobian
+        return self._deviation(np.zeros(len(jacobian), np.int64), jacobian)
+
+    @property
+    def sigma_theta(self) -> Array:
+        """Standard deviation of theta, shape (n,)."""
+        basis = self.problem.basis
+        return self._deviation(basis.first + 1, basis.value)
+
+    @property
+    def sigma_kappa(self) -> Array:
+        """Standard deviation of kappa, shape (n,)."""
+        basis = self.problem.basis
+        return self._deviation(basis.first + 1, basis.slope)
+
+    def _deviation(self, first: NDArray[np.int64], rows: Array) -> Array:
+        return np.asarray(_deviation(first, rows, self.covariance))
+
+    def turned(self, drift: Array, reach: float) -> float:
+        """Return by how much errors that neighbours share turn the root.
+
+        Parameters
+        ----------
+        drift : ndarray, shape (n,)
+            Standard deviation of such an error of each measured point, px.
+        reach : float
+            Distance over which their correlation falls by a factor e, px.
+
+        Returns
+        -------
+        float
+            Standard deviation of theta at the root, rad.
+        """
+        kept = math.exp(-float(self.curve.s[1] - self.curve.s[0]) / reach)
+        return math.sqrt(_shared_power(self.lever * drift, kept))
+
+
+@njit(cache=True)
+def _shared_power(part: Array, kept: float) -> float:
+    """Variance of the sum of parts whose correlation falls by `kept` a step."""
+    total, before = 0.0, 0.0
+    for x in part:
+        total += x * x + 2.0 * x * before
+        before = kept * (before + x)
+    return max(total, 0.0)
+
+
+@njit(cache=True)
+def _deviation(first: NDArray[np.int64], rows: Array, covariance: Array) -> Array:
+    """Root of the diagonal of A C A^T; a row of A holds `rows` from `first` on."""
+    out = np.empty(first.size)
+    count = rows.shape[1]
+    for i in range(first.size):
+        power, start = 0.0, first[i]
+        for j in range(count):
+            pulled = 0.0
+            for k in range(count):
+                pulled += covariance[start + j, start + k] * rows[i, k]
+            power += rows[i, j] * pulled
+        out[i] = np.sqrt(max(power, 0.0))
+    return out
+
+
+def fit_curve(
+    s: Array,
+    points: Array,
+    weights: Array,
+    *,
+    spacing: float,
+    joints: Sequence[float] = (),
+    iterations: int = 2,
+    theta: Array | None = None,
+    stiffness: float | None = None,
+    shared: float = SHARED,
+    within: float = 0.0,
+    smooth: Smooth | None = None,
+) -> CurveFit:
+    """Fit theta(s) to points measured near an even grid of arc length.
+
+    Parameters
+    ----------
+    s : ndarray, shape (n,)
+        Even grid of arc length.
+    points : ndarray, shape (n, 2)
+        Measured positions; only their distance along the normal counts.
+    weights : ndarray, shape (n,)
+        Measurements that each point is the mean of; 0 where there was none.
+    spacing : float
+        Distance of knots.
+    joints : sequence of float
+        Arc lengths where the curvature may jump.
+    iterations : int
+        Gauss-Newton steps.
+    theta : ndarray, shape (n,), optional
+        Tangent angles to start from; otherwise from the points.
+    stiffness : float, optional
+        Weight of the penalty, px^5 (px^3 for a moment of order 1); the most likely one
+        when not given.
+    shared : float
+        Neighbouring measurements that count as one: the fewer, the more supple the
+        curve.
+    within : float
+        Sum of the squares of the measurements about the means that the points are.
+    smooth : Smooth, optional
+        What is known of the bending moment.
+
+    Returns
+    -------
+    CurveFit
+        With covariances.
+    """
+    if theta is None:
+        theta = _chord_angles(points)
+    problem = pose(
+        s, points, weights, theta, spacing=spacing, joints=joints, shared=shared,
+        within=within,
+    )  # fmt: skip
+    smooth = smooth or Smooth()
+    strength = math.nan if stiffness is None else stiffness
+    for _ in range(iterations - 1):
+        fit = solve(problem, smooth, strength, last=False)
+        origin, coefficients = parameters(problem, fit.change)
+        problem = linearised(problem, origin, coefficients)
+    return solve(problem, smooth, strength)
+
+
+def solve(
+    problem: Problem, smooth: Smooth, strength: float = math.nan, *, last: bool = True
+) -> CurveFit:
+    """Fit a curve under a prior on the bending moment, in one step of Gauss-Newton.
+
+    Parameters
+    ----------
+    problem : Problem
+        The measured points, linearised.
+    smooth : Smooth
+        The prior.
+    strength : float, optional
+        Weight of the penalty; the most likely one if NaN.
+    last : bool
+        Whether it is the last step; before that, any fair weight will do.
+    """
+    penalty, nullity = penalty_on_moment(
+        problem.knots, smooth, problem.s, problem.theta
+    )
+    change, covariance, freedom = _solution(
+        problem, penalty, strength, nullity + 1, last
+    )
+    points, theta, kappa, residual = moved(problem, change)
+    noise, correlation = _scatter(problem, residual, freedom)
+    basis, start = problem.basis, problem.basis.first[0] + 1
+    turn = covariance[:, start : start + 4] @ basis.value[0]
+    return CurveFit(
+        curve=Curve(s=problem.s, points=points, theta=theta, kappa=kappa),
+        residual=residual,
+        noise=noise,
+        correlation=correlation,
+        freedom=freedom,
+        problem=problem,
+        change=change,
+        covariance=covariance * (noise**2 * correlation / problem.shared),
+        lever=problem.jacobian @ turn * problem.weight / problem.shared,
+    )
+
+
+def _chord_angles(points: Array) -> Array:
+    step = np.gradient(points, axis=0)
+    return np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
+
+
+@njit(cache=True)
+def _solution(
+    problem: Problem, penalty: Array, strength: float, free: int, last: bool
+) -> tuple[Array, Array, float]:
+    """Return the parameters, their covariance for unit noise, and how many count."""
+    total = np.sum(problem.weight * problem.residual**2) + problem.within
+    strength, normal, right = penalised(
+        problem.normal, problem.right, penalty, problem.coefficients, strength,
+        total / problem.shared, np.sum(problem.weight) / problem.shared, free, last,
+    )  # fmt: skip
+    half = factor(normal)
+    covariance = squared(inverse(half))
+    freedom = len(normal) - strength * np.sum(penalty * covariance[1:, 1:])
+    return solved(half, right), covariance, freedom
+
+
+@njit(cache=True)
+def _scatter(problem: Problem, residual: Array, freedom: float) -> tuple[float, float]:
+    """Return the noise of a measurement and by how much its correlation widens."""
+    weight, within = problem.weight, problem.within
+    used = weight > 0.0
+    count, between = np.sum(weight), np.sum((weight * residual**2)[used])
+    noise = np.sqrt((between + within) / max(count - freedom, 1.0))
+    each = count / max(float(np.sum(used)), 1.0)
+    alike = _correlation(residual, used, max(round(24.0 / each), 6))
+    return noise, max(alike * each * between / max(between + within, 1e-300), 1.0)
+
+
+@njit(cache=True)
+def _correlation(residual: Array, used: NDArray[np.bool_], lags: int) -> float:
+    """Return 1 + 2 sum of the residuals' autocorrelation, at least 1."""
+    power, count = 0.0, 0
+    for i in range(residual.size):
+        if used[i]:
+            power += residual[i] ** 2
+            count += 1
+    if power <= 0.0:
+        return 1.0
+    power /= count
+    total = 1.0
+    for lag in range(1, min(lags, residual.size - 2) + 1):
+        product, pairs = 0.0, 0
+        for i in range(lag, residual.size):
+            if used[i] and used[i - lag]:
+                product += residual[i] * residual[i - lag]
+                pairs += 1
+        if pairs < 4:
+            break
+        rho = product / pairs / power
+        if rho < 0.02:
+            break
+        total += 2.0 * rho
+    return total

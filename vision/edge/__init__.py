@@ -1,0 +1,1 @@
+"""Sub-pixel edges: walls, tip, clamp."""

@@ -1,0 +1,207 @@
+"""Where the rod leaves the clamp, sub-pixel, for a clamp of any colour at any side.
+
+Two lines can be seen. (A) On the rod's own lanes the clamp's face begins where the dark
+of the rod ends: there if clamp and rod differ in grey value. (B) Beside the rod the
+front of the clamp meets the paper: there for a black clamp too. Neither lies at the
+height of the axis, so where the camera sees the clamp at an angle, each is shifted
+along the rod; `extract` corrects for that, knowing the camera.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.jit import njit
+from ..curve.curve import Curve
+from .edges import clear_of
+from .tip import SPAN, STEP_PX, EndFace, crossings_of, fit_step, lanes, line_through
+
+Array = NDArray[np.float64]
+Image = NDArray[np.float32]
+
+_LANES = np.linspace(-0.5, 0.5, 9)
+_BESIDE = np.linspace(0.5, 2.0, 13)
+_CLAMP_SPAN = 3.0
+"""So many blurs of the clamp are fitted: its foot and the corner over the rod are dark,
+and only what lies right beside the line makes the step."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ClampLines:
+    """The two lines at a clamp, as far as they are seen.
+
+    Parameters
+    ----------
+    face : EndFace or None
+        (A) Where the rod's dark ends on its own lanes.
+    front : EndFace or None
+        (B) The clamp's front against the paper beside the rod.
+    """
+
+    face: EndFace | None
+    front: EndFace | None
+
+    def shifted(self, first: float) -> ClampLines:
+        """Return the lines with arc length counted from `first`."""
+        face, front = (
+            None if line is None else replace(line, s=line.s - first)
+            for line in (self.face, self.front)
+        )
+        return ClampLines(face=face, front=front)
+
+
+def between(first: float, second: float, lines: ClampLines) -> float:
+    """Return a place between those that each of two lines tells.
+
+    What shade does to a line goes with the inverse of its step's height, and so does
+    the noise: the weight is the square of that.
+    """
+    face, front = lines.face, lines.front
+    a = 0.0 if face is None else face.rise**2
+    b = 0.0 if front is None else front.rise**2
+    return (a * first + b * second) / (a + b) if a + b > 0.0 else 0.5 * (first + second)
+
+
+def find_clamp(
+    grey: Image,
+    curve: Curve,
+    *,
+    expected: float,
+    width: float,
+    blur: float,
+    contrast: float,
+    reach: float,
+    sign: float = 1.0,
+    fine: bool = True,
+) -> ClampLines:
+    """Find the clamp's lines near an expected arc length (s falls into the clamp).
+
+    Parameters
+    ----------
+    grey : ndarray, shape (height, width), float32
+        Linear light.
+    curve : Curve
+        The axis, from about the clamp to the tip.
+    expected, reach : float
+        Where to look along s, and how far to either side, px.
+    width, blur : float
+        Width of the rod and standard deviation of the blur, px.
+    contrast : float
+        Light of paper minus light of rod.
+    sign : float
+        -1 for a light rod.
+    fine : bool
+        Whether to fit a step after taking the half level.
+
+    Returns
+    -------
+    ClampLines
+        Each None where it is not seen.
+    """
+    near = clear_of(blur)
+    span = reach + near + max(8.0, SPAN * blur)
+    s = np.arange(expected - span, expected + span, STEP_PX)
+    return ClampLines(
+        face=_face(grey, curve, s, expected, width, blur, contrast, reach, sign, fine),
+        front=_front(
+            grey, curve, s, expected, width, blur, contrast, reach, sign, fine
+        ),
+    )
+
+
+def _face(
+    grey: Image, curve: Curve, s: Array, expected: float, width: float, blur: float,
+    contrast: float, reach: float, sign: float, fine: bool,
+) -> EndFace | None:  # fmt: skip
+    near = clear_of(blur)
+    across = 0.6 * _LANES * width
+    light = np.ascontiguousarray(lanes(grey, curve, s, across, sign)[:, ::-1])
+    place = _steepest(light, -s[::-1], -expected, reach, 0.12 * contrast)
+    if np.isnan(place):
+        return None
+    place = _end_of_dark(light, -s[::-1], place, 0.12 * contrast)
+    crossing = crossings_of(light, -s[::-1], place, near, 3.0, 4.0, reach=4.0)
+    line = line_through(across, crossing)
+    if line is None:
+        return None
+    if fine:
+        line = fit_step(
+            light, -s[::-1], across, line, crossing, blur=blur, inner=SPAN * blur,
+            outer=_CLAMP_SPAN * blur,
+        )  # fmt: skip
+    return replace(line, s=-line.s, skew=-line.skew)
+
+
+def _front(
+    grey: Image, curve: Curve, s: Array, expected: float, width: float, blur: float,
+    contrast: float, reach: float, sign: float, fine: bool,
+) -> EndFace | None:  # fmt: skip
+    near = clear_of(blur)
+    beside = (_BESIDE if fine else _BESIDE[::2]) * width + near + 3.0
+    crossings: list[Array] = []
+    offsets: list[Array] = []
+    seen: list[Array] = []
+    for across in (-beside[::-1], beside):
+        light = lanes(grey, curve, s, across, sign)
+        place = _steepest(light, s, expected, reach, 0.15 * contrast)
+        if np.isnan(place):
+            continue
+        crossings.append(crossings_of(light, s, place, near, 3.0, 4.0, reach=4.0))
+        offsets.append(across)
+        seen.append(light)
+    if not offsets:
+        return None
+    across, crossing = np.concatenate(offsets), np.concatenate(crossings)
+    line = line_through(across, crossing)
+    if line is None or not fine:
+        return line
+    return fit_step(
+        np.concatenate(seen), s, across, line, crossing, blur=blur,
+        inner=_CLAMP_SPAN * blur, outer=SPAN * blur,
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def _steepest(
+    light: Array, s: Array, expected: float, reach: float, least: float
+) -> float:
+    """Return where the mean of lanes rises most over 3 px, if by `least`; else NaN."""
+    lag = int(3.0 / STEP_PX)
+    best, place = least, np.nan
+    for k in range(s.size - lag):
+        centre = 0.5 * (s[k] + s[k + lag])
+        if abs(centre - expected) <= reach:
+            rise = 0.0
+            for i in range(len(light)):
+                rise += (light[i, k + lag] - light[i, k]) / len(light)
+            if rise > best:
+                best, place = rise, centre
+    return place
+
+
+@njit(cache=True)
+def _end_of_dark(light: Array, s: Array, place: float, least: float) -> float:
+    """Return where lanes leave the dark of the rod, at or before their steepest rise.
+
+    Between rod and clamp may lie the clamp's face, lighter than the one and darker than
+    the other, so that its top edge is the steeper rise.
+    """
+    lag = int(3.0 / STEP_PX)
+    mean = np.zeros(s.size)
+    for i in range(len(light)):
+        mean += light[i] / len(light)
+    steepest = int((place - s[0]) / STEP_PX)
+    dark = np.nanmin(mean[: steepest + 1])
+    k = steepest
+    while k > 0 and mean[k] > dark + 0.5 * least:
+        k -= 1
+    if k + 2 * lag >= steepest:
+        return place
+    best, end = 0.0, place
+    for j in range(max(k - lag, 0), k + lag):
+        if mean[j + lag] - mean[j] > best:
+            best, end = mean[j + lag] - mean[j], 0.5 * (s[j] + s[j + lag])
+    return end

@@ -1,0 +1,368 @@
+"""Sub-pixel side edges of a rod: profiles across it, crossed at half level.
+
+Profiles are sampled along the normals by bilinear interpolation of our own (OpenCV's is
+quantised to 1/32 px in some versions). On each side the edge is where the light is half
+way between the rod just inside and the paper just outside: each side has its own
+levels, and the paper's is a straight line carried to the edge, so that a soft shadow
+lying along one side does not pull the edge. For an edge blurred by a Gaussian of
+standard deviation b on paper with slope g, half level lies g b / sqrt(2 pi) above the
+mean of the two levels; that term is kept.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.jit import njit
+from ..curve.robust import median
+
+Array = NDArray[np.float64]
+Image = NDArray[np.float32]
+
+STEP_PX = 0.5
+"""Distance of samples along a profile."""
+
+_SHADE = 0.003
+"""Slope of the paper beside a rod, per px and contrast, that is no shade yet."""
+
+_ROOT_2PI = 2.5066282746310002
+
+_SLOPE_VARIANCE = 0.171
+"""Variance, px^2, of the place whose slope the line through four samples tells: 0.9 of
+its weight is even over 1.5 px, and 0.1 over 0.5 px."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Edges:
+    """Side edges along a rod, as offsets from a curve along its normals, in px.
+
+    Parameters
+    ----------
+    low, high : ndarray, shape (n,)
+        Offset of the edge on the negative and the positive side; NaN where not found.
+    slope_low, slope_high : ndarray, shape (n,)
+        Rise of light per px at the edge, outwards.
+    inner, outer_low, outer_high : ndarray, shape (n,)
+        Level of the rod and of the paper at either edge.
+    shade_low, shade_high : ndarray, shape (n,)
+        Slope of the paper's level beside the edge, per px outwards.
+    """
+
+    low: Array
+    high: Array
+    slope_low: Array
+    slope_high: Array
+    inner: Array
+    outer_low: Array
+    outer_high: Array
+    shade_low: Array
+    shade_high: Array
+
+    @property
+    def middle(self) -> Array:
+        """Offset of the midline."""
+        return 0.5 * (self.low + self.high)
+
+    @property
+    def width(self) -> Array:
+        """Distance of the edges."""
+        return self.high - self.low
+
+    @property
+    def contrast(self) -> float:
+        """Median difference between paper and rod."""
+        paper = 0.5 * (self.outer_low + self.outer_high)
+        return median(paper - self.inner)
+
+    @property
+    def blur(self) -> float:
+        """Standard deviation of the blur, from the slope at the edges, in px."""
+        rise = np.concatenate(
+            [
+                (self.outer_low - self.inner) / self.slope_low,
+                (self.outer_high - self.inner) / self.slope_high,
+            ]
+        )
+        variance = (median(rise) / _ROOT_2PI) ** 2 - _SLOPE_VARIANCE
+        return math.sqrt(max(variance, 0.01))
+
+    def usable(
+        self, walls: Array | float = 0.0, *, least: float = 0.6
+    ) -> NDArray[np.bool_]:
+        """Stations with both edges, of a width like the others' but for side walls.
+
+        Those whose width is within `least` px of the median are of use in any case.
+        """
+        width = self.width - walls
+        away = np.abs(width - median(width))
+        return np.asarray(away < max(5.0 * 1.4826 * median(away), least))
+
+    def shaded(self, blur: float) -> Array:
+        """Half the difference of what the paper's slope does to either edge, px."""
+        reach = 1.5 * clear_of(blur)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            low = self.shade_low / self.slope_low
+            high = self.shade_high / self.slope_high
+        return np.nan_to_num(0.25 * reach * np.abs(high - low))
+
+
+def find_edges(
+    grey: Image,
+    points: Array,
+    normals: Array,
+    low: Array,
+    high: Array,
+    *,
+    reach: float,
+    blur: float,
+    fuzz: float = 0.0,
+    sign: float = 1.0,
+    smooth: int = 6,
+) -> Edges:
+    """Find both side edges near where they are expected.
+
+    Parameters
+    ----------
+    grey : ndarray, shape (height, width), float32
+        Linear light.
+    points, normals : ndarray, shape (n, 2)
+        Stations (x, y) and unit normals.
+    low, high : ndarray, shape (n,)
+        Expected offsets of the edges, in px.
+    reach : float
+        How far from there to look, in px.
+    blur : float
+        Standard deviation of the blur, in px: the levels are taken clear of it.
+    fuzz : float
+        How far hairs and burrs reach, in px: the levels are taken clear of these too.
+    sign : float
+        -1 for a light rod.
+    smooth : int
+        Stations to either side over which levels are averaged.
+
+    Returns
+    -------
+    Edges
+        NaN where no edge was found.
+    """
+    half = 0.5 * (median(high) - median(low))
+    close, gap, window = level_spans(blur, fuzz)
+    gaps = close, gap
+    span = max(reach + 1.0, gaps[1] + window)
+    # Samples lie a quarter of a pixel and more to either side of the expected edge; a
+    # profile reaches no further in than the axis.
+    before = max(int(min(span, half) / STEP_PX + 0.5), 2)
+    strip = np.empty((len(points), before + int(span / STEP_PX) + 1), np.float32)
+    filters = _level_filters(strip.shape[1], before, gaps, window, blur)
+    out = np.empty((2, 7, len(points)))
+    for side, (outwards, edge) in enumerate(((-1.0, low), (1.0, high))):
+        _sample(grey, points, normals, edge, outwards, before, np.float32(sign), strip)
+        _measure_side(strip, before, filters, smooth, reach, blur, out[side])
+        out[side, 0] += outwards * edge
+    # Levels close to the edges know the shade and so the middle; those clear of the
+    # blur, whose shape is not quite a Gaussian's, know the width, on a side without
+    # shade.
+    growth = (out[0, 5] + out[1, 5]) / (out[0, 6] + out[1, 6])
+    out[:, 0] += np.where(np.abs(growth) < 0.5, growth, 0.0)
+    return Edges(
+        low=-out[0, 0], high=out[1, 0], slope_low=out[0, 1], slope_high=out[1, 1],
+        inner=0.5 * (out[0, 2] + out[1, 2]), outer_low=out[0, 3], outer_high=out[1, 3],
+        shade_low=out[0, 4], shade_high=out[1, 4],
+    )  # fmt: skip
+
+
+def clear_of(blur: float) -> float:
+    """Return how far from an edge its blur hardly reaches, px."""
+    return max(1.5, 2.2 * blur)
+
+
+def level_spans(blur: float, fuzz: float) -> tuple[float, float, float]:
+    """Return where levels are taken, px: close to the edge, clear of it; how far on.
+
+    A little farther than the blur itself asks for: on photographs what is closer to the
+    edge is unsure (a rounded edge, the lens's halo).
+    """
+    wide = max(math.hypot(blur, math.sqrt(_SLOPE_VARIANCE)), fuzz)
+    return max(0.6, 1.1 * wide), clear_of(wide), max(4.0, 3.0 * wide)
+
+
+@njit(cache=True)
+def _level_filters(
+    columns: int, before: int, gaps: tuple[float, float], window: float, blur: float
+) -> Array:
+    """Return the weights of both filters, (6, m): near the edge, then clear of it."""
+    filters = np.empty((6, columns))
+    filters[:3] = _level_filter(columns, before, gaps[0], window, blur)
+    filters[3:] = _level_filter(columns, before, gaps[1], window, blur)
+    return filters
+
+
+@njit(cache=True)
+def _level_filter(
+    columns: int, before: int, gap: float, window: float, blur: float
+) -> Array:
+    """Return the weights of samples in inner level, outer level and its slope, (3, m).
+
+    Least squares of a step onto a slope, both blurred by a Gaussian, on samples at
+    either side, `gap` clear of the edge: so the blurred edge's own tails count neither
+    as rod nor as shade. The outer level is that at the edge.
+    """
+    design = np.zeros((columns, 3))
+    for k in range(columns):
+        t = (k - before + 0.5) * STEP_PX
+        if gap <= abs(t) <= gap + window:
+            outside = 0.5 * (1.0 + math.erf(t / (blur * math.sqrt(2.0))))
+            bell = math.exp(-0.5 * (t / blur) ** 2) / _ROOT_2PI
+            design[k, 0] = 1.0 - outside
+            design[k, 1] = outside
+            design[k, 2] = t * outside + blur * bell
+    normal = design.T @ design
+    if normal[0, 0] < 0.5:
+        # Narrower than the blur: the darkest there is, at the axis.
+        design[0, 0] += 1.0
+        normal = design.T @ design
+    return np.asarray(np.linalg.solve(normal, design.T))
+
+
+@njit(cache=True)
+def _smooth(rows: Array, half: int) -> None:
+    """Replace each value by the mean over its neighbours in the row, NaN left out."""
+    count = rows.shape[1]
+    for row in rows:
+        old = row.copy()
+        total, number = 0.0, 0
+        for i in range(-half, count):
+            if i + half < count and not np.isnan(old[i + half]):
+                total += old[i + half]
+                number += 1
+            if i - half > 0 and not np.isnan(old[i - half - 1]):
+                total -= old[i - half - 1]
+                number -= 1
+            if i >= 0:
+                row[i] = total / number if number else np.nan
+
+
+@njit(cache=True)
+def _bilinear(grey: Image, x: float, y: float) -> float:
+    height, width = grey.shape
+    if not (x >= 0.0 and y >= 0.0 and x <= width - 1.0 and y <= height - 1.0):
+        return np.nan
+    j = min(int(x), width - 2)
+    i = min(int(y), height - 2)
+    u, v = x - j, y - i
+    top = grey[i, j] * (1.0 - u) + grey[i, j + 1] * u
+    bottom = grey[i + 1, j] * (1.0 - u) + grey[i + 1, j + 1] * u
+    return float(top * (1.0 - v) + bottom * v)
+
+
+@njit(cache=True)
+def _sample(
+    grey: Image, points: Array, normals: Array, edge: Array, outwards: float,
+    before: int, sign: float, strip: Image,
+) -> None:  # fmt: skip
+    """Fill the strip: a row a station, columns outwards, the edge behind `before`."""
+    count, columns = strip.shape
+    height, width = grey.shape
+    for i in range(count):
+        u, v = outwards * normals[i, 0], outwards * normals[i, 1]
+        first = outwards * edge[i] + (0.5 - before) * STEP_PX
+        last = first + (columns - 1) * STEP_PX
+        x, y = points[i, 0] + first * u, points[i, 1] + first * v
+        far_x, far_y = points[i, 0] + last * u, points[i, 1] + last * v
+        u, v = STEP_PX * u, STEP_PX * v
+        if (
+            min(x, far_x) >= 0.0 and max(x, far_x) < width - 1.001
+            and min(y, far_y) >= 0.0 and max(y, far_y) < height - 1.001
+        ):  # fmt: skip
+            # Well inside: no sample needs to be checked.
+            for k in range(columns):
+                px, py = x + k * u, y + k * v
+                j, m = int(px), int(py)
+                fx, fy = np.float32(px - j), np.float32(py - m)
+                a, b = grey[m, j], grey[m, j + 1]
+                c, d = grey[m + 1, j], grey[m + 1, j + 1]
+                top = a + (b - a) * fx
+                strip[i, k] = sign * (top + (c + (d - c) * fx - top) * fy)
+            continue
+        for k in range(columns):
+            strip[i, k] = sign * _bilinear(grey, x + k * u, y + k * v)
+
+
+@njit(cache=True)
+def _levels(strip: Image, filters: Array, levels: Array) -> None:
+    """Fill levels, (6, n), with what both filters make of every profile."""
+    count, columns = strip.shape
+    for i in range(count):
+        a, b, c, d, e, f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for k in range(columns):
+            g = strip[i, k]
+            a += filters[0, k] * g
+            b += filters[1, k] * g
+            c += filters[2, k] * g
+            d += filters[3, k] * g
+            e += filters[4, k] * g
+            f += filters[5, k] * g
+        levels[0, i], levels[1, i], levels[2, i] = a, b, c
+        levels[3, i], levels[4, i], levels[5, i] = d, e, f
+
+
+@njit(cache=True, error_model="numpy")
+def _measure_side(
+    strip: Image, before: int, filters: Array, smooth: int, reach: float, blur: float,
+    out: Array,
+) -> None:  # fmt: skip
+    """Fill out, (7, n): edge, its slope, the outer filter's levels, growth, certainty.
+
+    Growth is how much farther out the edge is with the outer filter's levels than with
+    the inner's, times the certainty that the paper there has no shade.
+    """
+    count = len(strip)
+    levels = np.empty((6, count))
+    _levels(strip, filters, levels)
+    _smooth(levels, smooth)
+    for i in range(count):
+        near, far = levels[:3, i], levels[3:, i]
+        level = 0.5 * (near[0] + near[1]) + near[2] * blur / _ROOT_2PI
+        place, slope = np.nan, np.nan
+        if near[1] > near[0]:
+            place, slope = _crossing(strip[i], before, level, reach)
+        sure = 1.0 / (far[2] ** 2 + (_SHADE * (far[1] - far[0])) ** 2)
+        growth = 0.5 * (far[0] + far[1]) + far[2] * blur / _ROOT_2PI - level
+        out[0, i], out[1, i] = place, slope
+        out[2:5, i] = far
+        out[5, i], out[6, i] = sure * growth / slope, sure
+
+
+@njit(cache=True)
+def _crossing(
+    profile: Image, before: int, level: float, reach: float
+) -> tuple[float, float]:
+    """Find the crossing nearest to the expected place; fit a line through 4 samples.
+
+    Returns its place and the slope there; NaN where the profile does not cross.
+    """
+    best = -1
+    for away in range(int(reach / STEP_PX) + 1):
+        for k in (before - 1 - away, before - 1 + away):
+            inside = 1 <= k < profile.size - 2
+            if inside and profile[k] < level <= profile[k + 1]:
+                best = k
+                break
+        if best >= 0:
+            break
+    if best < 0:
+        return np.nan, np.nan
+    a, b = profile[best - 1], profile[best]
+    c, d = profile[best + 1], profile[best + 2]
+    slope = (0.3 * (d - a) + 0.1 * (c - b)) / STEP_PX
+    if not slope > 0.0:
+        return np.nan, np.nan
+    middle = (best - before + 1) * STEP_PX
+    place = middle + (level - 0.25 * (a + b + c + d)) / slope
+    if abs(place - middle) > STEP_PX:
+        place = middle - 0.5 * STEP_PX + (level - b) / (c - b) * STEP_PX
+    return place, slope

@@ -1,0 +1,134 @@
+"""Where a rod begins and ends: its clamp, the border or another face, and its tip."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..curve.curve import Curve
+from ..curve.robust import median
+from ..find.rod import Root
+from .clamp import ClampLines, between, find_clamp
+from .state import LostError, Seen, State
+from .tip import EndFace, find_tip
+from .wall_light import MIRRORED, SKY, Walls, short_of_end, wall_light
+
+Array = NDArray[np.float64]
+Image = NDArray[np.float32]
+
+APART_PX = 2.0
+"""The two lines at a clamp tell different things if they are farther apart."""
+
+_FINE = 2
+"""The first pass whose ends are more than places to look at next."""
+
+
+def find_ends(
+    grey: Image, state: State, seen: Seen, root: Root, sign: float, turn: int,
+    walls: Walls | None,
+) -> tuple[EndFace, ClampLines | None, float]:  # fmt: skip
+    """Return the tip, the lines at a clamp, and the arc length where the rod begins."""
+    curve, width = state.curve, state.width
+    outwards = 0.4 * width if turn == 0 else 0.0
+    reach = 1.3 * width if turn == 0 else 0.3 * width + 2.0
+    edges = seen.edges
+    near = seen.good & (seen.s > curve.s[-1] - 3.0 * width)
+    middle = median(edges.middle[near]) if near.any() and turn == 0 else 0.0
+    end = seen.good & (seen.s > curve.s[-1] - 1.5 * width)
+    taper = median(edges.width[end]) if end.sum() > 3 else width
+    for far in (reach, 1.3 * width):  # the end of a taper may lie farther on
+        tip = find_tip(
+            grey, curve, expected=state.last + outwards, width=min(width, taper),
+            blur=state.blur, reach=far, middle=middle, sign=sign, fine=turn >= _FINE,
+        )  # fmt: skip
+        if tip is not None:
+            break
+    if tip is None:
+        raise LostError("no_tip", "the free end of the rod has no edge")
+    if walls is not None and turn >= _FINE:
+        tip = _to_end_of_face(tip, state, seen, walls)
+    if root == "border":
+        return tip, None, _border_crossing(grey, curve)
+    if root == "free":
+        return tip, None, _other_end(grey, state, sign, outwards, reach)
+    lines = find_clamp(
+        grey, curve, expected=state.first - (0.25 * width if turn == 0 else 0.0),
+        width=width, blur=state.blur, contrast=edges.contrast,
+        reach=1.3 * width if turn == 0 else 0.3 * width + 3.0, sign=sign,
+        fine=turn >= _FINE,
+    )  # fmt: skip
+    return tip, lines, _first(lines, state.face_px)
+
+
+def _to_end_of_face(tip: EndFace, state: State, seen: Seen, walls: Walls) -> EndFace:
+    """Move the tip to where the end face ends, which is lighter where it is seen.
+
+    A right angle on, the end face is a side wall. A step fitted to a blurred profile
+    takes the half level of what is blurred once more.
+    """
+    points, theta = state.curve.at(np.array([tip.s]))
+    wall, gap = walls(points, theta + 0.5 * np.pi, state.width)
+    wall = np.maximum(wall, 0.0)
+    top = np.array([median(seen.edges.inner[seen.good])])
+    away = 2.0 * np.abs(gap) + 0.5 * wall
+    paper, level = top + tip.rise, np.zeros(1)
+    light = wall_light(wall, away, state.width, top, paper, level, MIRRORED, SKY)
+    blur = math.sqrt(2.0) * state.blur
+    short = short_of_end(wall, light, blur, float(wall[0]), 1.0)
+    return replace(tip, s=tip.s + float(short[0]))
+
+
+def _first(lines: ClampLines, face_px: float) -> float:
+    """Return the arc length where the rod begins, as it is seen."""
+    line = lines.face or lines.front
+    if line is None:
+        raise LostError("no_clamp", "it is not seen where the rod leaves the clamp")
+    if lines.front is None:
+        return line.s
+    apart = lines.front.s - line.s
+    if is_face(apart, face_px):
+        return lines.front.s  # what has edges between them is no rod
+    return line.s if abs(apart) > APART_PX else between(line.s, lines.front.s, lines)
+
+
+def is_face(apart: float, face_px: float) -> bool:
+    """Whether what lies between the two lines at a clamp is its face, seen obliquely.
+
+    It may be as dark as the rod, which then seems to end at the face's top edge.
+    """
+    return APART_PX < apart < APART_PX + face_px
+
+
+def _other_end(
+    grey: Image, state: State, sign: float, outwards: float, reach: float
+) -> float:
+    curve = state.curve
+    back = Curve(
+        s=-curve.s[::-1], points=curve.points[::-1], theta=curve.theta[::-1] + np.pi,
+        kappa=-curve.kappa[::-1],
+    )  # fmt: skip
+    end = find_tip(
+        grey, back, expected=outwards - state.first, width=state.width,
+        blur=state.blur, reach=reach, sign=sign,
+    )  # fmt: skip
+    if end is None:
+        raise LostError("no_tip", "an end of the rod has no edge")
+    return -end.s
+
+
+def _border_crossing(grey: Image, curve: Curve) -> float:
+    """Return the arc length at which the axis enters the picture."""
+    s = np.arange(-80.0, min(80.0, curve.s[-1]), 0.25)
+    points, _ = curve.at(s)
+    height, width = grey.shape
+    inside = (
+        (points[:, 0] >= 0.0) & (points[:, 0] <= width - 1.0)
+        & (points[:, 1] >= 0.0) & (points[:, 1] <= height - 1.0)
+    )  # fmt: skip
+    outside = np.flatnonzero(~inside)
+    return (
+        float(s[outside[-1] + 1]) if outside.size and outside[-1] + 1 < len(s) else 0.0
+    )

@@ -1,0 +1,54 @@
+"""What one edge pass sees and hands to the next, and that a rod can get lost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..curve.curve import Curve
+from .edges import Edges
+
+Array = NDArray[np.float64]
+
+
+class LostError(Exception):
+    """The edges or an end of the rod got lost; private to this package.
+
+    Parameters
+    ----------
+    flag, reason : str
+        As in `Measurement`.
+    """
+
+    def __init__(self, flag: str, reason: str) -> None:
+        super().__init__(reason)
+        self.flag = flag
+        self.reason = reason
+
+
+@dataclass(slots=True)
+class State:
+    """What a pass hands to the next: the curve, half widths along it, and the ends."""
+
+    curve: Curve
+    half: Array
+    width: float
+    first: float
+    last: float
+    face_px: float
+    rough: bool
+    blur: float = 1.0
+    scatter: float = 0.0
+    fuzz: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """Edges at stations along a curve, and which of them are to be trusted."""
+
+    s: Array
+    theta: Array
+    edges: Edges
+    good: NDArray[np.bool_]

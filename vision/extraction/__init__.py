@@ -1,0 +1,1 @@
+"""One photograph to one measured centreline."""

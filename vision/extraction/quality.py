@@ -1,0 +1,126 @@
+"""Gates: every doubt is a named flag, and what cannot be vouched for is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..camera.calibration import Calibration
+from ..curve.robust import median, quantile
+from ..edge.state import LostError
+from ..edge.tip import lanes
+from ..find.rod import Candidate
+from ..measurement import Measurement
+from ..picture.photo import Photo
+from .refine import Refined
+from .specimen_frame import Setting, root_hidden
+
+LENGTH_TOLERANCE = 0.02
+
+TURN_MM = 0.15
+"""What the standard deviation of the direction at the clamp may do to the tip."""
+
+SCALE = 5e-4
+"""Doubt of the scale, for want of the camera's height, above which it is named."""
+
+SHADE_PX = 0.04
+"""Pull of a shade on the midline, before correction, above which it is named."""
+
+
+def refusal(photo: Photo, refined: Refined, candidate: Candidate) -> None:
+    """Refuse a refined rod that contradicts what was found at first.
+
+    Raises
+    ------
+    LostError
+        With flag and reason.
+    """
+    length = float(refined.fit.curve.s[-1])
+    width = refined.typical_width
+    if not 0.8 < length / candidate.length_px < 1.5 + 8.0 * width / length:
+        raise LostError(
+            "inconsistent",
+            f"the measured axis is {length:.0f} px long, but the dark thing it belongs "
+            f"to {candidate.length_px:.0f} px",
+        )
+    if refined.good.mean() < 0.5:
+        raise LostError(
+            "edges_lost",
+            f"only {100 * refined.good.mean():.0f} % of the rod has two clear edges",
+        )
+    if refined.fit.noise > 0.25 * width:
+        raise LostError("inconsistent", "the edges of the rod lie on no smooth curve")
+    if length < 5.0 * width:
+        raise LostError("no_rod", "what looks like a rod is shorter than five widths")
+
+
+def doubts(
+    result: Measurement,
+    photo: Photo,
+    refined: Refined,
+    candidate: Candidate,
+    setting: Setting,
+) -> Measurement:
+    """Return the measurement with its flags."""
+    flags: list[str] = []
+    if setting.calibration is None:
+        flags.append("uncalibrated")
+    elif _scale_sd(setting.calibration, setting.rod_height_mm) > SCALE:
+        flags.append("height_doubtful")
+    if candidate.root == "border":
+        flags.append("clamp_at_border")
+    if candidate.root == "free":
+        flags.append("no_clamp")
+    if root_hidden(refined, setting):
+        flags.append("root_hidden")
+    if candidate.root == "clamp" and _goes_on(photo, refined):
+        flags.append("clamp_doubtful")
+    if direction_is_doubtful(result.clamp_angle_sd_deg, result.length_mm):
+        flags.append("direction_doubtful")
+    if photo.clipped > 0.01:
+        flags.append("overexposed")
+    if quantile(refined.shaded[refined.good], 0.9) > SHADE_PX:
+        flags.append("shadow")
+    unsure = refined.good.mean() < 0.8 or refined.fit.noise > 0.02 * result.width_px
+    if refined.rough or unsure:
+        flags.append("rough_edges")
+    if refined.tip.scatter > 0.5 or abs(refined.tip.skew) > 0.2:
+        flags.append("ragged_tip")
+    length = result.length_mm
+    nominal = setting.length_mm
+    if nominal is not None and abs(length / nominal - 1.0) > LENGTH_TOLERANCE:
+        flags.append("length_mismatch")
+    return replace(result, flags=tuple(flags))
+
+
+def _scale_sd(camera: Calibration, rod_height_mm: float) -> float:
+    """Return how well the scale is known at the rod's height, relative."""
+    if rod_height_mm == 0.0:
+        return 0.0
+    height = camera.camera_height_mm
+    return abs(rod_height_mm) * camera.camera_height_sd_mm / height**2
+
+
+def direction_is_doubtful(sd_deg: float, length_mm: float) -> bool:
+    """Whether the direction at the clamp may move the tip by more than `TURN_MM`."""
+    return bool(np.radians(sd_deg) * length_mm > TURN_MM)
+
+
+def _goes_on(photo: Photo, refined: Refined) -> bool:
+    """Whether a dark line between two lighter sides goes on behind the clamp's line.
+
+    Then that line may be the border of a shadow (or the clamp has an open groove).
+    """
+    width = refined.typical_width
+    beside = 0.5 * width + 4.0
+    across = np.array([-beside, -0.2 * width, 0.0, 0.2 * width, beside])
+    curve = refined.fit.curve
+    behind, before = (
+        lanes(photo.grey, curve, np.linspace(first, last, 9) * width, across)
+        for first, last in ((-1.6, -1.0), (1.0, 3.0))
+    )
+    rod, paper = median(before[1:4].ravel()), median(before[::4].ravel())
+    light = np.array([median(lane) for lane in behind])
+    light = (light - rod) / (paper - rod)
+    return bool(light[1:4].max() < 0.15 and min(light[0], light[4]) > 0.3)

@@ -1,0 +1,314 @@
+"""Edge passes: edges, ends and curve in turn, until nothing moves any more."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.jit import njit
+from ..curve.curve import Curve
+from ..curve.fit import CurveFit, solve
+from ..curve.joints import find_joints
+from ..curve.moment import weighed_fit
+from ..curve.problem import SHARED, pose
+from ..curve.robust import median
+from ..curve.spline import Smooth
+from ..edge.clamp import ClampLines
+from ..edge.edges import Edges, find_edges
+from ..edge.ends import find_ends
+from ..edge.state import LostError, Seen, State
+from ..edge.tip import EndFace
+from ..edge.wall_light import Walls, to_wall_ends
+from ..find.rod import Root
+from ..find.track import FLARED, Start
+
+Array = NDArray[np.float64]
+Image = NDArray[np.float32]
+
+_PASSES = 5
+_SEEKING_PASSES, _NEAR_PX = 2, 0.4
+"""At most so many passes only seek the rod, on every other station and with a supple
+curve; one that moves it by less is the last of them."""
+_STILL_PX, _ENDS_STILL_PX = 0.02, 0.15
+"""By how much the curve and its ends may move when all is found; the ends are those of
+the curve as it is then."""
+_JOINTS_STILL_PX = 0.05
+"""A curve that moves by less keeps its joints."""
+_BIN_PX = 4.0
+_BINS = 200
+"""Stations are averaged over bins before the fit: so far, or so many on a long rod."""
+
+ROOT_CLEAR = 0.3
+"""Widths next to the clamp that are left out of the fit."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Refined:
+    """A rod measured in pixels.
+
+    Parameters
+    ----------
+    fit : CurveFit
+        The axis from where the clamp line was taken (s = 0) to the tip's face.
+    shaded : ndarray, shape (n,)
+        By how much shade on the paper would have moved the midline, uncorrected, px.
+    good : ndarray of bool, shape (n,)
+        Points of the fit whose edges were used.
+    width : ndarray, shape (n,)
+        Smoothed width.
+    sigma_width : ndarray, shape (n,)
+        Its standard deviation.
+    tip : EndFace
+        The free end; s counts as in `fit`.
+    clamp : ClampLines or None
+        Lines at the clamp; None for a rod that enters at the border or floats.
+    rough : bool
+        Whether its edges wander, as a yarn's.
+    """
+
+    fit: CurveFit
+    shaded: Array
+    good: NDArray[np.bool_]
+    width: Array
+    sigma_width: Array
+    tip: EndFace
+    clamp: ClampLines | None
+    rough: bool
+
+    @property
+    def typical_width(self) -> float:
+        """Median width where edges were used."""
+        return median(self.width[self.good])
+
+
+def refine(
+    grey: Image,
+    start: Start,
+    *,
+    root: Root,
+    sign: float,
+    joints: Callable[[Curve], Sequence[float]] = lambda _curve: (),
+    walls: Walls | None = None,
+    face_px: float = 0.0,
+) -> Refined:
+    """Measure axis, edges and ends.
+
+    Parameters
+    ----------
+    grey : ndarray, shape (height, width), float32
+        Linear light.
+    start : Start
+        Curve within a pixel or two of the axis.
+    root : {"clamp", "border", "free"}
+        What the rod grows from.
+    sign : float
+        -1 for a light rod.
+    joints : callable
+        Arc lengths in px, from the root, of joints on a given curve.
+    walls : callable, optional
+        How wide the side walls are seen at points and angles of the axis, for a given
+        width of the rod, px, and the gap between them and the paper; positive where
+        seen on the left.
+    face_px : float
+        How much of a clamp's face the camera may see, along the rod.
+
+    Raises
+    ------
+    LostError
+        If edges or ends cannot be found.
+    """
+    half = np.full(len(start.curve.s), 0.5 * start.width)
+    last = float(start.curve.s[-1])
+    state = State(
+        start.curve, half, start.width, 0.0, last, face_px, start.rough, start.blur
+    )
+    seen, seeking = _look(grey, state, sign, 0, seeking=True), True
+    tip, lines, first = find_ends(grey, state, seen, root, sign, 0, walls)
+    places, aside = None, np.inf
+    for turn in range(_PASSES):
+        if turn:
+            seen = _look(grey, state, sign, turn, seeking=seeking)
+        if walls is not None:
+            seen = to_wall_ends(state, seen, walls)
+        known = None if places is None or aside > _JOINTS_STILL_PX else places - first
+        fit, used, aside, places = _fit(
+            state, seen, first, tip.s, joints, known, seeking=seeking,
+            clamped=root == "clamp",
+        )  # fmt: skip
+        at = fit.curve.s + first
+        width, sigma_width = _smooth_width(seen, at, state.width)
+        shaded = np.interp(at, seen.s, seen.edges.shaded(state.blur))
+        state.curve, state.half = fit.curve, 0.5 * width
+        state.first, state.last = 0.0, float(fit.curve.s[-1])
+        # The ends of the curve as it is now: often they move when it does not.
+        tip, lines, first = find_ends(grey, state, seen, root, sign, turn + 1, walls)
+        moved = abs(first) + abs(tip.s - state.last)
+        still = aside < _STILL_PX and moved < _ENDS_STILL_PX
+        if still and not seeking:
+            break
+        seeking = seeking and turn + 1 < _SEEKING_PASSES and aside > _NEAR_PX
+    curve = replace(fit.curve, s=fit.curve.s - first)
+    return Refined(
+        fit=replace(fit, curve=curve), shaded=shaded, good=used, width=width,
+        sigma_width=sigma_width, tip=replace(tip, s=tip.s - first),
+        clamp=None if lines is None else lines.shifted(first), rough=state.rough,
+    )  # fmt: skip
+
+
+def _look(grey: Image, state: State, sign: float, turn: int, *, seeking: bool) -> Seen:
+    """Find the edges along the curve; know its width, blur and roughness after."""
+    width = state.width
+    step = 2.0 if seeking else 1.0
+    s = np.linspace(0.0, state.curve.s[-1], int(state.curve.s[-1] / step) + 1)
+    points, theta = state.curve.at(s)
+    normals = np.column_stack([-np.sin(theta), np.cos(theta)])
+    half = np.interp(s, state.curve.s, state.half)
+    # Where the blur, of variance v, moves edges of curvature k: by k v / 2.
+    bend = np.interp(s, state.curve.s, state.curve.kappa)
+    points += (0.5 * state.blur**2 * bend)[:, None] * normals
+    # At first the edges lie where they are expected to a pixel or two.
+    reach, fuzz = min(0.35 * width, 6.0 + 0.1 * width), min(0.1 * width, 3.0)
+    if turn:
+        fuzz = 4.0 * state.scatter
+        reach = min(max(3.0, 3.0 * state.blur, 3.0 * fuzz), 0.45 * width)
+    state.fuzz = fuzz
+    edges = find_edges(
+        grey, points, normals, -half, half,
+        reach=reach, blur=state.blur, fuzz=fuzz, sign=sign, smooth=int(6.0 / step),
+    )  # fmt: skip
+    good = edges.usable(least=FLARED * width if state.rough else 0.6)
+    if good.sum() < max(8.0, 0.4 * len(good)):
+        raise LostError(
+            "edges_lost",
+            "less than half of the rod has two edges that can be told from the paper",
+        )
+    state.width = median(edges.width[good])
+    blur = edges.blur
+    state.blur = float(np.clip(blur, 0.3, 0.5 * state.width)) if blur > 0 else 1.0
+    state.scatter = _scatter(edges, int(5.0 / step))
+    return Seen(s, theta, edges, good)
+
+
+def _scatter(edges: Edges, lag: int) -> float:
+    """Return how much an edge jumps from one station to one about 5 px on, px."""
+    low, high = edges.low, edges.high
+    jump = median(
+        np.abs(np.concatenate([low[lag:] - low[:-lag], high[lag:] - high[:-lag]]))
+    )
+    return 1.05 * jump if jump > 0.0 else 0.0
+
+
+def _fit(
+    state: State, seen: Seen, first: float, last: float,
+    joints: Callable[[Curve], Sequence[float]], known: Array | None, *, seeking: bool,
+    clamped: bool,
+) -> tuple[CurveFit, NDArray[np.bool_], float, Array | None]:  # fmt: skip
+    """Return the curve, points used, how far it moved, and joints as they were found.
+
+    `known` are the joints that a pass before found, from the root on.
+    """
+    width = state.width
+    if last - first < 4.0 * width:
+        raise LostError("no_rod", "what looks like a rod is shorter than four widths")
+    clear = max(2.0, 2.5 * state.blur)
+    # The corner between clamp and paper is dark: edges there are no edges of the rod.
+    root = max(clear, ROOT_CLEAR * width) if clamped else clear
+    use = seen.good & (seen.s > first + root) & (seen.s < last - clear)
+    if use.sum() < 8:
+        raise LostError("edges_lost", "too few edges of the rod are seen")
+    count = max(int((last - first) / max(_BIN_PX, (last - first) / _BINS)), 16)
+    s = np.linspace(first, last, count + 1)
+    offset, within, weights = np.zeros((3, count + 1))
+    _average(seen.s, seen.edges.middle, use, s, offset, within, weights)
+    points, theta = state.curve.at(s)
+    measured = points + offset[:, None] * np.column_stack(
+        [-np.sin(theta), np.cos(theta)]
+    )
+    # Supple while the rod is sought, then stiff enough not to follow shade; the path
+    # of a rough rod (yarn) is no elastica, and stays supple.
+    supple = seeking or state.rough or state.scatter > 0.03 * width
+    places = np.array(joints(state.curve))
+    if not supple and not places.size:
+        places = known if known is not None else np.array(find_joints(
+            seen.s - first, seen.theta, np.where(use, seen.edges.middle, 0.0),
+            use.astype(np.float64), width=width, shared=SHARED,
+        ))  # fmt: skip
+
+    spacing = max((1.0 if supple else 1.5) * width, (last - first) / 50.0)
+    inner = [x for x in places if spacing < x < last - first - spacing]
+
+    def fitted(weights: Array) -> CurveFit:
+        problem = pose(
+            s - first, measured, _held_ends(weights, s, width), theta,
+            spacing=spacing, joints=inner,
+            shared=(3.0 if supple else SHARED) / float(seen.s[1]),
+            within=float(within[weights > 0.0].sum()),
+        )  # fmt: skip
+        if supple:
+            return solve(problem, Smooth())
+        return weighed_fit(problem, inner, float(weights.sum()) / SHARED)
+
+    fit = fitted(weights)
+    if not seeking:
+        away = np.abs(np.nan_to_num(fit.residual))
+        outlying = away > 4.0 * np.sqrt(np.mean(away**2)) + 1e-3
+        left = np.where(outlying, 0.0, weights)
+        if outlying.any() and left.sum() > 0.5 * weights.sum():
+            weights = left
+            fit = fitted(weights)
+    aside = np.nanmax(np.abs(offset - fit.residual))
+    return (
+        fit,
+        weights > 0.5 * median(weights),
+        float(aside),
+        None if supple else places,
+    )
+
+
+@njit(cache=True)
+def _average(
+    s: Array, value: Array, use: NDArray[np.bool_], at: Array,
+    mean: Array, within: Array, count: Array,
+) -> None:  # fmt: skip
+    """Average values over the bins about the points of an even grid.
+
+    `within` becomes the sum of squares about the mean, `count` the number of values.
+    """
+    step = at[1] - at[0]
+    for i in range(s.size):
+        k = int((s[i] - at[0]) / step + 0.5)
+        if use[i] and s[i] >= at[0] and k < at.size:
+            count[k] += 1.0
+            change = value[i] - mean[k]
+            mean[k] += change / count[k]
+            within[k] += change * (value[i] - mean[k])
+
+
+def _held_ends(weights: Array, s: Array, width: float) -> Array:
+    """Return weights by which a frayed end keeps a little of the shape it had."""
+    seen = np.flatnonzero(weights)
+    held = weights.copy()
+    little = 0.03 * weights.max()
+    if s[-1] - s[seen[-1]] > 0.6 * width:
+        held[seen[-1] + 1 :] = little
+    if s[seen[0]] - s[0] > 0.6 * width:
+        held[: seen[0]] = little
+    return held
+
+
+def _smooth_width(seen: Seen, at: Array, typical: float) -> tuple[Array, Array]:
+    """Return the width as a running mean over one rod width, and its deviation."""
+    s, good, width = seen.s, seen.good, seen.edges.width
+    half = max(2, int(0.5 * typical / s[1]))
+    window = np.ones(2 * half + 1)
+    total = np.convolve(np.where(good, width, 0.0), window)[half:-half]
+    count = np.convolve(good.astype(np.float64), window)[half:-half]
+    known = count >= 0.3 * len(window)
+    mean = np.interp(s, s[known], total[known] / count[known])
+    # From means that share no station: neighbours share samples and levels.
+    jump = median(np.abs(mean[len(window) :] - mean[: -len(window)]))
+    sigma = 1.05 * jump * np.sqrt(len(window) / np.maximum(count, 1.0))
+    return np.interp(at, s, mean), np.interp(at, s, sigma)

@@ -1,0 +1,1 @@
+"""Where the rod is, to a pixel."""

@@ -1,0 +1,366 @@
+"""Find the rod among dark things: a long thin one that grows from a fat one.
+
+The clamp may be as black as the rod, so shape tells them apart, not grey value: what
+survives an opening with a disc wider than the rod is clamp (or magnet), what it removes
+and is long for its width is rod. A geodesic distance from the root orders the
+rod's pixels, and the centres of its level sets are the start curve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.jit import njit
+from ..curve.robust import median
+from .binarise import Binary
+from .discs import near_core
+from .level_sets import level_sets
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.uint8]
+Root = Literal["clamp", "border", "free"]
+
+LEAST_SLENDERNESS = 6.0
+"""Shortest rod, in widths."""
+
+LEAST_SHARE = 0.2
+"""Shortest rod beside another long thin thing, over the length of that."""
+
+_FINE = 3.0
+"""Half width under which the commonest width may be that of a hair or a line."""
+
+_HAIR = 0.35
+"""Width of what grows from the tip of a rod in a clamp, over the rod's, if a hair."""
+
+_BIN, _HALVED = 0.09, 8
+"""Width of a bin of log width, and bins from one width to half of it."""
+
+_GRAIN = 1.5
+"""Half width under which a thing may be noise."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Candidate:
+    """Something long and thin, in pixels of the photograph.
+
+    Parameters
+    ----------
+    points_px : ndarray, shape (n, 2)
+        Start curve (x, y) from root to tip.
+    width_px, length_px : float
+        Rough width and length.
+    root : {"clamp", "border", "free"}
+        What it grows from.
+    contacts : int
+        Separate places where it touches something fat or the border.
+    ratio : float
+        Light on it relative to the background.
+    """
+
+    points_px: Array
+    width_px: float
+    length_px: float
+    root: Root
+    contacts: int
+    ratio: float
+
+    @property
+    def slenderness(self) -> float:
+        """Length over width."""
+        return self.length_px / self.width_px
+
+    def away(self, point: Array) -> float:
+        """Distance of a point (x, y) from the start curve, px."""
+        return float(np.hypot(*(self.points_px - point).T).min())
+
+
+def find_candidates(binary: Binary) -> list[Candidate]:
+    """Return the long thin things of a picture, longest first.
+
+    Parameters
+    ----------
+    binary : Binary
+        The mask.
+
+    Returns
+    -------
+    list of Candidate
+        Possibly empty.
+    """
+    contours, tree = cv2.findContours(
+        binary.mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE
+    )
+    if tree is None:
+        return []
+    links = np.reshape(np.asarray(tree, dtype=np.int32), (-1, 4))
+    found: list[Candidate] = []
+    least = 0.04 * max(binary.mask.shape)
+    for index in range(len(contours)):
+        if links[index, 3] >= 0:
+            continue
+        x, y, w, h = cv2.boundingRect(contours[index])
+        if max(w, h) < least:
+            continue
+        roi = _fill(contours, links, index, (x, y, w, h))
+        found.extend(_thin_parts(roi, (x, y), binary))
+    found.sort(key=lambda item: -item.length_px)
+    return found
+
+
+def _fill(
+    contours: object,
+    tree: NDArray[np.int32],
+    index: int,
+    box: tuple[int, int, int, int],
+) -> Mask:
+    """Draw one thing with a frame of 1 px; slits (glare) are closed, holes stay."""
+    x, y, w, h = box
+    roi = np.zeros((h + 2, w + 2), np.uint8)
+    offset = (1 - x, 1 - y)
+    cv2.drawContours(roi, contours, index, 1, cv2.FILLED, offset=offset)  # type: ignore[call-overload]
+    child = int(tree[index, 2])
+    while child >= 0:
+        hole = contours[child]  # type: ignore[index]
+        area = cv2.contourArea(hole)
+        if 2.0 * area > 5.0 * cv2.arcLength(hole, closed=True):
+            cv2.drawContours(roi, contours, child, 0, cv2.FILLED, offset=offset)  # type: ignore[call-overload]
+        child = int(tree[child, 0])
+    return roi
+
+
+def _thin_parts(roi: Mask, origin: tuple[int, int], binary: Binary) -> list[Candidate]:
+    """Return the thin parts of a thing: of the commonest width, or grown from that."""
+    depth = _edge_distance(roi, origin, binary)
+    ridge = _ridge(depth)
+
+    def of_width(half: float) -> list[Candidate]:
+        return _of_width(roi, depth, half, origin, binary) if half else []
+
+    common, thinner, thicker = _half_widths(ridge)
+    found = of_width(common)
+    if not found and common < _GRAIN:
+        # Grains of noise along the edges of something wide may outnumber the rod.
+        common, thinner, thicker = _half_widths(ridge[ridge >= _GRAIN])
+        found = of_width(common)
+    if common < _FINE:
+        found = _without_hairs(found, of_width(thicker))
+    # A bar that reaches far into the picture is long and thin itself, but the clamp of
+    # a thinner one that grows from its end.
+    longest = max((item.length_px for item in found), default=0.0)
+    palest = max((item.ratio for item in found), default=1.0)
+    grown = [
+        item
+        for item in of_width(thinner)
+        if item.root == "clamp"
+        and item.length_px > LEAST_SHARE * longest
+        and item.ratio < palest + 0.1
+        and not any(_touches(item, bar) and not _from_end(item, bar) for bar in found)
+    ]
+    return grown or found
+
+
+def _without_hairs(found: list[Candidate], thicker: list[Candidate]) -> list[Candidate]:
+    """Leave out what grows from the side of a rod: hairs and lines that touch it."""
+    rods = [
+        rod
+        for rod in thicker
+        if (rod.root != "free" or any(_touches(item, rod) for item in found))
+        and not any(_from_end(item, rod) or _is_end(item, rod) for item in found)
+    ]
+    return [
+        *(item for item in found if not any(_touches(item, rod) for rod in rods)),
+        *rods,
+    ]
+
+
+def _from_end(one: Candidate, other: Candidate) -> bool:
+    """Whether a thing grows from the free end of another, which is its clamp then."""
+    away = np.hypot(*(other.points_px[-1] - one.points_px[0]))
+    return (
+        bool(away < 1.5 * other.width_px)
+        and one.length_px > LEAST_SHARE * other.length_px
+        and (other.root == "border" or one.width_px > _HAIR * other.width_px)
+    )
+
+
+def _is_end(one: Candidate, other: Candidate) -> bool:
+    """Whether a thing is the outer part of another: a rod with its clamp."""
+    return bool(np.hypot(*(other.points_px[-1] - one.points_px[-1])) < other.width_px)
+
+
+def _touches(one: Candidate, other: Candidate) -> bool:
+    """Whether a thing grows from beside another."""
+    return other.away(one.points_px[0]) < 1.5 * other.width_px
+
+
+def _of_width(
+    roi: Mask, depth: NDArray[np.float32], half: float, origin: tuple[int, int],
+    binary: Binary,
+) -> list[Candidate]:  # fmt: skip
+    """Return the parts of a thing that are about `half` wide to either side."""
+    reach = 1.5 * half + 1.0
+    fat = near_core(depth, reach, reach + 1.0)
+    thin = (roi > fat).view(np.uint8)
+    parts, _ = cv2.findContours(thin, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    found = []
+    for part in parts:
+        if len(part) < 8.0 * half:
+            continue
+        x, y, w, h = cv2.boundingRect(part)
+        # One frame pixel stays around, so that contacts show.
+        x0, y0 = max(x - 2, 0), max(y - 2, 0)
+        window = (slice(y0, y + h + 2), slice(x0, x + w + 2))
+        piece = np.zeros(thin[window].shape, np.uint8)
+        cv2.drawContours(piece, [part], 0, 1, cv2.FILLED, offset=(-x0, -y0))
+        piece &= thin[window]
+        place = (origin[0] - 1 + x0, origin[1] - 1 + y0)
+        candidate = _trace(piece, fat[window], place, half, binary)
+        if candidate is not None:
+            found.append(candidate)
+    return found
+
+
+def _edge_distance(
+    roi: Mask, origin: tuple[int, int], binary: Binary
+) -> NDArray[np.float32]:
+    """Return the distance to the paper; the border of the picture is no paper."""
+    height, width = binary.mask.shape
+    (x, y), (h, w) = origin, (roi.shape[0] - 2, roi.shape[1] - 2)
+    inside = (
+        slice(int(y == 0), h + 2 - int(y + h == height)),
+        slice(int(x == 0), w + 2 - int(x + w == width)),
+    )
+    depth = np.zeros(roi.shape, np.float32)
+    depth[inside] = cv2.distanceTransform(roi[inside], cv2.DIST_L2, 5)
+    return depth
+
+
+@njit(cache=True)
+def _half_widths(ridge: NDArray[np.float32]) -> tuple[float, float, float]:
+    """Return the half widths that long and thin parts of the medial axis share.
+
+    First the commonest for its width, then the commonest of much thinner and of much
+    thicker ones; 0 where there is none long enough.
+    """
+    if ridge.size < 8:
+        return 0.0, 0.0, 0.0
+    bins = np.floor(np.log(ridge) / _BIN).astype(np.int64)
+    lowest = bins.min()
+    bins -= lowest
+    count = np.zeros(bins.max() + 1)
+    for k in bins:
+        count[max(k - 2, 0) : k + 3] += 1.0
+    width = np.exp(_BIN * (lowest + np.arange(count.size)))
+    score = count / np.sqrt(width)
+    best = np.argmax(score)
+    apart = np.abs(np.arange(count.size) - best) > _HALVED
+    score[~apart | (count < 2.0 * LEAST_SLENDERNESS * width)] = 0.0
+    found = np.zeros(3)
+    found[0] = np.median(ridge[np.abs(bins - best) <= 2])
+    for k in range(1, 3):
+        side = score[:best] if k == 1 else score[best:]
+        if side.size and side.max() > 0.0:
+            other = np.argmax(side) + (0 if k == 1 else best)
+            found[k] = np.median(ridge[np.abs(bins - other) <= 2])
+    return found[0], found[1], found[2]
+
+
+@njit(cache=True)
+def _ridge(depth: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the depths that no neighbour exceeds by more than 0.6.
+
+    The outermost pixels are a frame.
+    """
+    height, width = depth.shape
+    found = np.empty(height * width, dtype=np.float32)
+    count = 0
+    for i in range(1, height - 1):
+        above, row, below = depth[i - 1], depth[i], depth[i + 1]
+        for j in range(1, width - 1):
+            if row[j] < np.float32(0.9):
+                continue
+            most = row[j] + np.float32(0.6)
+            # One of the first four exceeds nearly every pixel that is none.
+            if (
+                row[j - 1] <= most and row[j + 1] <= most
+                and above[j] <= most and below[j] <= most
+                and above[j - 1] <= most and above[j + 1] <= most
+                and below[j - 1] <= most and below[j + 1] <= most
+            ):  # fmt: skip
+                found[count] = row[j]
+                count += 1
+    return found[:count]
+
+
+def _trace(
+    piece: Mask,
+    fat: Mask,
+    place: tuple[int, int],
+    half: float,
+    binary: Binary,
+) -> Candidate | None:
+    if cv2.countNonZero(piece) < 4.0 * LEAST_SLENDERNESS * half * half:
+        return None
+    touching, contacts = _contact(piece & _grown(fat))
+    at_border, border_contacts = _contact(piece & _border(piece.shape, place, binary))
+    root: Root = "free"
+    seeds = None
+    if contacts:
+        root, seeds = "clamp", touching
+    elif border_contacts:
+        root, seeds = "border", at_border
+    curve = level_sets(piece, seeds, half)
+    if curve is None:
+        return None
+    steps = np.hypot(*np.diff(curve, axis=0).T)
+    length = float(steps.sum()) + (2.0 if root == "free" else 1.0) * half
+    width = max(2.0 * half, 1.0)
+    if length < LEAST_SLENDERNESS * width:
+        return None
+    x, y = np.rint(curve + place).astype(int).T
+    f = binary.factor
+    return Candidate(
+        points_px=(curve + place + 0.5) * f - 0.5,
+        width_px=width * f,
+        length_px=length * f,
+        root=root,
+        contacts=contacts + border_contacts,
+        ratio=median(binary.ratio[y, x]),
+    )
+
+
+def _contact(both: Mask) -> tuple[Mask, int]:
+    """Return the pixels of one place where two masks meet, and how many there are."""
+    x, y, w, h = cv2.boundingRect(both)
+    if w == 0:
+        return both, 0
+    # Far fewer pixels than the whole, and a frame for them to grow into.
+    box = (slice(y, y + h), slice(x, x + w))
+    small = np.zeros((h + 4, w + 4), np.uint8)
+    small[2:-2, 2:-2] = both[box]
+    count, labels = cv2.connectedComponents(_grown(small))
+    first = np.zeros_like(both)
+    first[box] = both[box] & (labels[2:-2, 2:-2] == 1)
+    return first, count - 1
+
+
+def _grown(mask: Mask) -> Mask:
+    """Grow a mask by two pixels."""
+    return np.asarray(cv2.dilate(mask, np.ones((5, 5), np.uint8)), dtype=np.uint8)
+
+
+def _border(shape: tuple[int, ...], place: tuple[int, int], binary: Binary) -> Mask:
+    """Mark the outermost pixels of the picture inside a window."""
+    height, width = binary.mask.shape
+    x, y = place
+    inside = np.zeros(shape, np.uint8)
+    inside[: max(1 - y, 0)] = 1
+    inside[max(height - 1 - y, 0) :] = 1
+    inside[:, : max(1 - x, 0)] = 1
+    inside[:, max(width - 1 - x, 0) :] = 1
+    return inside

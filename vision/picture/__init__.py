@@ -1,0 +1,1 @@
+"""Photographs as arrays in linear light."""
