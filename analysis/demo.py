@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..core.errors import StoreError
-from ..rig.config import read_plan
-from ..rig.template import write_templates
+from ..rig.bench.config import read_plan
+from ..rig.bench.template import write_templates
 from .compare import compare_run, write_comparison
 from .fit import try_fit
 from .load import load_run

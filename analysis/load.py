@@ -22,8 +22,8 @@ from ..core.errors import ConfigError, InputError, StoreError
 from ..core.magnet import Magnet
 from ..core.specimen import Specimen
 from ..core.specimen_file import MagnetModel, SpecimenModel
-from ..rig.config import BenchModel
-from ..rig.read_run import read_run
+from ..rig.bench.config import BenchModel
+from ..rig.runs.read import read_run
 from ..sim import Support
 from ..vision.camera.calibration import Calibration
 from ..vision.measurement import Pose

@@ -14,12 +14,12 @@ from ..core.errors import ConfigError, RigError, VisionError
 from ..core.files import write_bytes, write_text
 from ..core.specimen import Specimen
 from ..core.specimen_file import specimen_dict
+from ..rig.bench.config import Plan, read_plan
+from ..rig.bench.devices import Devices, closing_all
+from ..rig.bench.template import write_templates
 from ..rig.clock import Clock, SteppedClock
-from ..rig.config import Plan, read_plan
-from ..rig.devices import Devices, closing_all
 from ..rig.link import WireLog
-from ..rig.runner import RunSummary, run
-from ..rig.template import write_templates
+from ..rig.runs.runner import RunSummary, run
 from ..rig.virtual.bench import open_twin
 from ..vision.batch.run import Settings, extract_files
 from ..vision.camera.calibrate import calibrate

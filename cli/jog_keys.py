@@ -13,7 +13,7 @@ from ..core.errors import RigError
 from .keyboard import END, Keyboard, has_keys
 
 if TYPE_CHECKING:
-    from ..rig.gap_stage import GapStage
+    from ..rig.stage.gap import GapStage
 
 STEPS_MM = {"1": 0.1, "2": 0.5, "3": 1.0, "4": 5.0, "5": 10.0}
 FARTHER = {"up", "right", "+", "k"}

@@ -15,9 +15,9 @@ from ..core.errors import StoreError
 from .keys import answering
 
 if TYPE_CHECKING:
+    from ..rig.bench.config import Plan
+    from ..rig.bench.devices import Devices
     from ..rig.clock import Clock
-    from ..rig.config import Plan
-    from ..rig.devices import Devices
 
 
 def needs_twin(plan: Plan) -> bool:
@@ -39,7 +39,7 @@ def ask_flux(gap_mm: float) -> float | None:
     StoppedError
         On Ctrl-C.
     """
-    from ..rig.stage import StoppedError
+    from ..rig.stage.protocol import StoppedError
 
     while True:
         try:
@@ -86,9 +86,9 @@ def open_bench(
     camera : bool
         False where no picture is taken.
     """
+    from ..rig.bench.open import open_devices
     from ..rig.clock import SteppedClock, SystemClock
     from ..rig.link import WireLog
-    from ..rig.open_devices import open_devices
 
     clock: Clock = SystemClock() if twin_seed is None else SteppedClock()
     try:

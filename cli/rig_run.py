@@ -16,9 +16,9 @@ from .rig_bench import asks_flux, needs_twin, open_bench
 from .rig_show import print_dry_run, print_scan, print_summary
 
 if TYPE_CHECKING:
-    from ..rig.config import Plan
-    from ..rig.devices import Devices
-    from ..rig.runner import RunSummary
+    from ..rig.bench.config import Plan
+    from ..rig.bench.devices import Devices
+    from ..rig.runs.runner import RunSummary
 
 RUN_EXAMPLE = "Example: magbend rig run plan.toml --out runs/gmc2"
 VERIFY_EXAMPLE = "Example: magbend rig verify runs/gmc2"
@@ -80,7 +80,7 @@ def run(
     the signal USR1 or a file named pause in the run folder. What was recorded stays:
     --resume homes the stage, checks its position and takes the missing steps.
     """
-    from ..rig.config import read_plan
+    from ..rig.bench.config import read_plan
 
     checked = read_plan(plan)
     if dry_run:
@@ -102,8 +102,8 @@ def verify(
     as_json: Json = False,
 ) -> None:
     """Check that a run is whole and unaltered."""
-    from ..rig.read_run import read_run
-    from ..rig.verify import verify_run
+    from ..rig.runs.read import read_run
+    from ..rig.runs.verify import verify_run
 
     problems = verify_run(run)
     record = None if problems else read_run(run)
@@ -151,14 +151,14 @@ def scan_field(
     with two good readings or more and a magnet in the rig file, field.svg and the
     remanence.
     """
-    from ..rig.config import read_plan
+    from ..rig.bench.config import read_plan
 
     checked = read_plan(plan)
     gaps = tuple(_numbers(gaps_mm, "--gaps-mm")) if gaps_mm else checked.gaps_mm
     folder = out or Path("scans") / _dated_name(checked)
     readings_mT = _readings_mT(flux_mT, gaps)
     twin_seed = _twin_seed(checked, twin, seed, readings_mT)
-    from ..rig.scan_field import scan_field as scan
+    from ..rig.runs.scan_field import scan_field as scan
 
     with (
         open_bench(checked, folder, readings_mT, twin_seed, camera=False) as devices,
@@ -178,7 +178,7 @@ def init(
     ] = False,
 ) -> None:
     """Write commented rig, plan and specimen files."""
-    from ..rig.template import write_templates
+    from ..rig.bench.template import write_templates
 
     for path in write_templates(folder, twin=twin):
         typer.echo(str(path))
@@ -195,7 +195,7 @@ def _report(line: str) -> None:
 
 def _run_folder(plan: Plan, out: Path | None, resume: bool) -> Path:
     """Return where the run goes; refuse to touch one that is there."""
-    from ..rig.read_run import is_run
+    from ..rig.runs.read import is_run
 
     if out is None and resume:
         raise InputError(
@@ -268,8 +268,8 @@ def _carry_out(
     twin_seed: int | None,
     live_port: int | None,
 ) -> RunSummary:
-    from ..rig.control import RunControl
-    from ..rig.runner import run as carry_out
+    from ..rig.runs.control import RunControl
+    from ..rig.runs.runner import run as carry_out
     from .keys import pausing, terminating
 
     control = RunControl(folder)
@@ -296,7 +296,7 @@ def _watching(devices: Devices, port: int | None) -> Iterator[Callable[[str], No
     if port is None:
         yield _report
         return
-    from ..rig.live_view import LiveStatus, Watched, live_view
+    from ..rig.camera.live_view import LiveStatus, Watched, live_view
 
     if not isinstance(devices.camera, Watched):
         raise InputError("--live-port needs a camera or stream; files are not watched")

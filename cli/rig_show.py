@@ -10,14 +10,14 @@ from ..core.errors import RigError
 from .console import print_json
 
 if TYPE_CHECKING:
-    from ..rig.config import Plan
-    from ..rig.runner import RunSummary
-    from ..rig.scan_field import FieldScan
+    from ..rig.bench.config import Plan
+    from ..rig.runs.runner import RunSummary
+    from ..rig.runs.scan_field import FieldScan
 
 
 def print_dry_run(plan: Plan, as_json: bool) -> None:
     """Print the steps of a plan with what the simulator expects at each."""
-    from ..rig.dry_run import homing_s, plan_steps
+    from ..rig.runs.dry_run import homing_s, plan_steps
 
     steps = plan_steps(plan)
     previews: dict[int, Any] = {}

@@ -13,8 +13,8 @@ from .console import print_json
 from .keys import terminating
 
 if TYPE_CHECKING:
-    from ..rig.gap_stage import GapStage
-    from ..rig.stage_config import StageConfig
+    from ..rig.stage.config import StageConfig
+    from ..rig.stage.gap import GapStage
 
 RigOption = Annotated[Path, typer.Option("--rig", help="The rig file.")]
 PortOption = Annotated[
@@ -156,7 +156,7 @@ def stop(rig: RigOption = RIG, port: PortOption = None) -> None:
     A run or command that holds the port is told, and holds the stage.
     """
     from ..rig.clock import SystemClock
-    from ..rig.stop_request import stop_from_outside
+    from ..rig.stage.stop_request import stop_from_outside
 
     config, _ = _tables(rig, port)
     typer.echo(stop_from_outside(config, SystemClock()))
@@ -197,7 +197,7 @@ def set_gap(
 
     It is written to gap_at_zero_mm of the rig file.
     """
-    from ..rig.rig_file_edit import replace_gap_at_zero
+    from ..rig.bench.file_edit import replace_gap_at_zero
 
     with _connected(rig, port, log) as stage:
         gap_at_zero_mm = stage.assume_gap(gap_mm)
@@ -218,7 +218,7 @@ def twin(
     import time
 
     from ..rig.clock import SystemClock
-    from ..rig.virtual.board_file import load_board, save_board
+    from ..rig.virtual.board.file import load_board, save_board
     from ..rig.virtual.pty_server import PtyBoard
 
     board = load_board(state)
@@ -233,7 +233,7 @@ def twin(
 
 def _tables(rig: Path, port: str | None) -> tuple[StageConfig, Any]:
     from ..core.errors import ConfigError
-    from ..rig.config import read_rig
+    from ..rig.bench.config import read_rig
 
     if not rig.exists():
         raise ConfigError(
@@ -250,9 +250,9 @@ def _tables(rig: Path, port: str | None) -> tuple[StageConfig, Any]:
 @contextlib.contextmanager
 def _connected(rig: Path, port: str | None, log: Path | None) -> Iterator[GapStage]:
     from ..rig.clock import SystemClock
-    from ..rig.gap_stage import GapStage
     from ..rig.link import WireLog
-    from ..rig.stages import make_stage
+    from ..rig.stage.gap import GapStage
+    from ..rig.stage.make import make_stage
 
     config, bounds = _tables(rig, port)
     clock = SystemClock()
@@ -273,7 +273,7 @@ def _told_how_to_go_on(stage: GapStage) -> Iterator[None]:
     """Let Ctrl-C stop the stage, and say what its position is worth then."""
     from ..core.errors import RigError
     from ..rig.interrupts import interrupts
-    from ..rig.stage import StoppedError
+    from ..rig.stage.protocol import StoppedError
 
     with interrupts(stage.request_stop) as received:
         try:

@@ -15,7 +15,7 @@ from typing import Any, TextIO
 from ..core.errors import StageError
 from .clock import Clock
 from .ports import why_not_open
-from .stage import LinkLostError
+from .stage.protocol import LinkLostError
 
 _SLICE_S = 0.02
 _MAX_LINE = 4096

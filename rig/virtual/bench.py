@@ -6,17 +6,17 @@ import random
 from collections.abc import Mapping
 from typing import Any
 
+from ..bench.config import RigModel
+from ..bench.devices import Devices
 from ..clock import Clock, SteppedClock
-from ..config import RigModel
-from ..devices import Devices
-from ..gap_stage import GapStage
-from ..grbl import GrblStage
 from ..link import WireLog
+from ..stage.gap import GapStage
+from ..stage.grbl.stage import GrblStage
+from .board.firmware import GrblBoard
+from .board.plant import Plant
 from .camera import Render, VirtualCamera
 from .faults import TwinParts, schedule_faults
-from .grbl_board import GrblBoard
 from .meter import FluxAt, VirtualMeter
-from .plant import Plant
 from .protocol_twin import register_board
 
 # Homing, hard and soft limits on, motors always on, reports with the buffer state.

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Literal
 
 from ...core.errors import CameraError
-from ..camera import Frame, Image
+from ..camera.protocol import Frame, Image
 from ..clock import Check, Clock, go_on, wait
 
 CameraFault = Literal["stall", "dark"]

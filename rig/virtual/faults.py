@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..bench.twin_config import FaultConfig
 from ..clock import Clock
+from .board.firmware import GrblBoard
 from .camera import VirtualCamera
-from .fault_config import FaultConfig
-from .grbl_board import GrblBoard
 from .meter import VirtualMeter
 
 Strike = Callable[[float], None]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection
 from typing import Any, Literal
 
 from ..clock import Check, go_on
-from ..meter import Flux, Sample, combine
+from ..meter.protocol import Flux, Sample, combine
 
 MeterFault = Literal["overload", "silent"]
 FluxAt = Callable[[float], float]

@@ -16,8 +16,8 @@ from serial import PortNotOpenError, SerialBase, SerialException
 
 from ...core.errors import StageError
 from ..clock import Clock, ScaledClock, SystemClock
-from .board_file import load_board, save_board
-from .grbl_board import GrblBoard
+from .board.file import load_board, save_board
+from .board.firmware import GrblBoard
 
 _SLICE_S = 0.005
 _BOARDS: dict[str, tuple[GrblBoard, Clock]] = {}

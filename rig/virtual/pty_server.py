@@ -9,7 +9,7 @@ import threading
 
 from ...core.errors import StageError
 from ..clock import Clock
-from .grbl_board import GrblBoard
+from .board.firmware import GrblBoard
 
 _SLICE_S = 0.005
 

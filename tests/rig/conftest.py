@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from magbend.rig.bench.config import Plan, read_plan
+from magbend.rig.bench.devices import Devices
 from magbend.rig.clock import SteppedClock
-from magbend.rig.config import Plan, read_plan
-from magbend.rig.devices import Devices
-from magbend.rig.gap_stage import GapStage
-from magbend.rig.stage import StageIdentity, StageLimits, StageStatus
+from magbend.rig.stage.gap import GapStage
+from magbend.rig.stage.protocol import StageIdentity, StageLimits, StageStatus
 from magbend.rig.virtual.camera import VirtualCamera
 from magbend.rig.virtual.meter import VirtualMeter
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from magbend.rig.clock import SteppedClock
-from magbend.rig.gap_stage import GapStage
-from magbend.rig.grbl import GrblStage
 from magbend.rig.link import WireLog
-from magbend.rig.stage_config import LimitsConfig, StageConfig
-from magbend.rig.virtual.grbl_board import GrblBoard
-from magbend.rig.virtual.plant import Plant
+from magbend.rig.stage.config import LimitsConfig, StageConfig
+from magbend.rig.stage.gap import GapStage
+from magbend.rig.stage.grbl.stage import GrblStage
+from magbend.rig.virtual.board.firmware import GrblBoard
+from magbend.rig.virtual.board.plant import Plant
 from magbend.rig.virtual.protocol_twin import register_board
 
 SETTINGS = {1: 255, 20: 1, 21: 1, 22: 1, 130: 180}

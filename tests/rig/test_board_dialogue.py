@@ -21,8 +21,8 @@ from pathlib import Path
 
 import pytest
 
-from magbend.rig.grbl_protocol import Report, parse_report
-from magbend.rig.virtual.grbl_board import GrblBoard
+from magbend.rig.stage.grbl.protocol import Report, parse_report
+from magbend.rig.virtual.board.firmware import GrblBoard
 
 RECORDING = Path(__file__).parents[2] / "fixtures/rig/grbl_1.1h_dialogue.txt"
 FRESH = {"A", "V", "W", "Y"}

@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 
 from magbend.rig.clock import SteppedClock, SystemClock
-from magbend.rig.virtual.grbl_board import GrblBoard
-from magbend.rig.virtual.plant import Plant
+from magbend.rig.virtual.board.firmware import GrblBoard
+from magbend.rig.virtual.board.plant import Plant
 from magbend.rig.virtual.protocol_twin import register_board
 
 from .board_programme import Programme

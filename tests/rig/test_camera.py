@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from magbend.core.errors import CameraError, ConfigError
-from magbend.rig.camera import encode_png, grab_median, median
-from magbend.rig.camera_mjpeg import MultipartParser, decode_jpeg
-from magbend.rig.capture import BrokenPictureError, TornPictureTest
+from magbend.rig.bench.config import CameraConfig
+from magbend.rig.bench.open import open_camera
+from magbend.rig.camera.capture import BrokenPictureError, TornPictureTest
+from magbend.rig.camera.mjpeg import MultipartParser, decode_jpeg
+from magbend.rig.camera.protocol import encode_png, grab_median, median
 from magbend.rig.clock import SteppedClock, SystemClock
-from magbend.rig.config import CameraConfig
-from magbend.rig.open_devices import open_camera
 
 GENERATOR = np.random.default_rng(5)
 NOISE = GENERATOR.integers(0, 12, (120, 160), dtype=np.uint8)

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from magbend.core.errors import CameraError
-from magbend.rig import camera_opencv
-from magbend.rig.camera_lock import AUTOMATIC, MANUAL, lock, not_kept
-from magbend.rig.capture import CaptureCamera
+from magbend.rig.bench.config import CameraConfig
+from magbend.rig.camera import opencv as camera_opencv
+from magbend.rig.camera.capture import CaptureCamera
+from magbend.rig.camera.lock import AUTOMATIC, MANUAL, lock, not_kept
 from magbend.rig.clock import SystemClock
-from magbend.rig.config import CameraConfig
 
 EXPOSURE, AUTO = cv2.CAP_PROP_EXPOSURE, cv2.CAP_PROP_AUTO_EXPOSURE
 CONFIG = CameraConfig(exposure=100.0, warmup_s=0.0, latency_s=0.0, frame_timeout_s=0.5)

@@ -108,8 +108,8 @@ needs_pty = pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminal
 def moving(bench_folder):
     """A process in the middle of a slow move, on a pseudo-terminal."""
     from magbend.rig.clock import SystemClock
-    from magbend.rig.virtual.grbl_board import GrblBoard
-    from magbend.rig.virtual.plant import Plant
+    from magbend.rig.virtual.board.firmware import GrblBoard
+    from magbend.rig.virtual.board.plant import Plant
     from magbend.rig.virtual.pty_server import PtyBoard
 
     settings = {20: 1, 21: 1, 22: 1, 120: 500, 121: 500, 122: 500, 24: 400, 26: 20}

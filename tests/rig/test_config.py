@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from magbend.core.errors import ConfigError, StoreError
-from magbend.rig.config import SettleConfig, read_plan, read_rig
-from magbend.rig.dry_run import homing_s, plan_steps
-from magbend.rig.template import write_templates
+from magbend.rig.bench.config import SettleConfig, read_plan, read_rig
+from magbend.rig.bench.template import write_templates
+from magbend.rig.runs.dry_run import homing_s, plan_steps
 
 from .conftest import RIG, SPECIMEN
 

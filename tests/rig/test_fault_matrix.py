@@ -17,15 +17,15 @@ from pathlib import Path
 import pytest
 
 from magbend.core.errors import StageError, StoreError
-from magbend.rig import run_folder
+from magbend.rig.bench.config import Plan, read_plan
+from magbend.rig.bench.devices import Devices
 from magbend.rig.clock import SteppedClock
-from magbend.rig.config import Plan, read_plan
-from magbend.rig.devices import Devices
-from magbend.rig.read_run import read_run
-from magbend.rig.runner import run
-from magbend.rig.verify import verify_run
+from magbend.rig.runs import folder as run_folder
+from magbend.rig.runs.read import read_run
+from magbend.rig.runs.runner import run
+from magbend.rig.runs.verify import verify_run
 from magbend.rig.virtual.bench import open_twin, twin_board
-from magbend.rig.virtual.grbl_board import GrblBoard
+from magbend.rig.virtual.board.firmware import GrblBoard
 
 from .twin_run import render
 

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from magbend.core.errors import ConfigError
-from magbend.rig.config import read_plan, read_rig
-from magbend.rig.read_run import read_run
-from magbend.rig.runner import RunSummary, run
-from magbend.rig.verify import verify_run
+from magbend.rig.bench.config import read_plan, read_rig
+from magbend.rig.runs.read import read_run
+from magbend.rig.runs.runner import RunSummary, run
+from magbend.rig.runs.verify import verify_run
 from magbend.rig.virtual.bench import open_twin
 
 from .twin_run import render

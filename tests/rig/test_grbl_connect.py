@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from magbend.core.errors import StageError
-from magbend.rig.grbl_audit import homing_time_s
-from magbend.rig.virtual.plant import Plant
+from magbend.rig.stage.grbl.audit import homing_time_s
+from magbend.rig.virtual.board.plant import Plant
 
 from .stage_bench import SETTINGS, homed_bench, make_bench
 
@@ -94,7 +94,7 @@ def test_a_port_in_use_is_said():
     bench = make_bench()
     bench.stage.connect()
     bench.board.read()
-    from magbend.rig.grbl import GrblStage
+    from magbend.rig.stage.grbl.stage import GrblStage
 
     other = GrblStage(bench.raw._config, bench.clock)
     with pytest.raises(StageError, match="in use"):

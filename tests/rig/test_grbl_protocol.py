@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from magbend.rig.grbl_protocol import (
+from magbend.rig.stage.grbl.protocol import (
     ALARMS,
     Alarm,
     Banner,

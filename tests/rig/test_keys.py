@@ -197,7 +197,7 @@ def test_keys_of_windows_have_the_same_names(windows_keys):
 
 def test_the_pause_key_works_on_windows(windows_keys, monkeypatch, tmp_path):
     from magbend.cli.keys import pausing
-    from magbend.rig.control import RunControl
+    from magbend.rig.runs.control import RunControl
 
     for stream in (sys.stdin, sys.stderr):
         monkeypatch.setattr(stream, "isatty", lambda: True, raising=False)

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from magbend.rig.read_run import is_run, read_run
-from magbend.rig.verify import verify_run
+from magbend.rig.runs.read import is_run, read_run
+from magbend.rig.runs.verify import verify_run
 
 SCRIPT = Path(__file__).with_name("twin_run.py")
 GAPS_MM = [140.0 - 8.0 * index for index in range(12)]

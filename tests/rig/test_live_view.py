@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from magbend.core.errors import RigError
-from magbend.rig.camera import Frame
-from magbend.rig.live_view import LiveStatus, live_view
+from magbend.rig.camera.live_view import LiveStatus, live_view
+from magbend.rig.camera.protocol import Frame
 
 
 class Eye:

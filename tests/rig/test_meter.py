@@ -9,16 +9,16 @@ from pathlib import Path
 import pytest
 
 from magbend.core.errors import ConfigError, MeterError
-from magbend.rig.config import MeterConfig
-from magbend.rig.meter import Sample, combine
-from magbend.rig.meter_description import (
+from magbend.rig.bench.config import MeterConfig
+from magbend.rig.bench.open import open_meter
+from magbend.rig.meter.description import (
     MeterDescription,
     read_description,
     ready_meters,
 )
-from magbend.rig.meter_parse import parse_reply
-from magbend.rig.meter_serial import SerialMeter
-from magbend.rig.open_devices import open_meter
+from magbend.rig.meter.parse import parse_reply
+from magbend.rig.meter.protocol import Sample, combine
+from magbend.rig.meter.serial import SerialMeter
 
 FRAME = b"\x0241B30100003805\r"
 

@@ -14,8 +14,8 @@ from collections.abc import Iterator
 import pytest
 
 from magbend.core.errors import MeterError
-from magbend.rig.meter_description import read_description
-from magbend.rig.meter_serial import SerialMeter
+from magbend.rig.meter.description import read_description
+from magbend.rig.meter.serial import SerialMeter
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs POSIX")
 

@@ -12,8 +12,9 @@ from pathlib import Path
 
 import pytest
 
-from magbend.rig.grbl import GrblStage
-from magbend.rig.stage import (
+from magbend.rig.stage.config import StageConfig
+from magbend.rig.stage.grbl.stage import GrblStage
+from magbend.rig.stage.protocol import (
     AlarmError,
     InterlockError,
     LinkLostError,
@@ -21,7 +22,6 @@ from magbend.rig.stage import (
     StageError,
     StoppedError,
 )
-from magbend.rig.stage_config import StageConfig
 from magbend.rig.virtual.protocol_twin import register_board
 
 from .recorded_board import SAID, RecordedBoard, hal_words, line

@@ -13,10 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from magbend.core.errors import StoreError
-from magbend.rig import run_folder
-from magbend.rig.read_run import read_run, read_steps
-from magbend.rig.run_folder import RunFolder
-from magbend.rig.verify import verify_run
+from magbend.rig.runs import folder as run_folder
+from magbend.rig.runs.folder import RunFolder
+from magbend.rig.runs.read import read_run, read_steps
+from magbend.rig.runs.verify import verify_run
 
 MANIFEST = {"schema": 1, "name": "t", "plan": {"gaps_mm": [70.0, 60.0]}}
 
@@ -133,7 +133,7 @@ LIMITED = """
 import resource, signal, sys
 from pathlib import Path
 from magbend.core.errors import StoreError
-from magbend.rig.run_folder import RunFolder
+from magbend.rig.runs.folder import RunFolder
 folder = RunFolder.create(Path(sys.argv[1]), {"plan": {"gaps_mm": [2, 1]}}, "plan")
 folder.commit_step({"index": 0, "gap_mm": 2}, {"images/step_000.png": b"x" * 100})
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

@@ -9,11 +9,11 @@ import pandas as pd
 import pytest
 
 from magbend.core.errors import CameraError, StoreError
-from magbend.rig.control import RunControl
-from magbend.rig.read_run import read_run
-from magbend.rig.runner import run
-from magbend.rig.stage import InterlockError, LinkLostError
-from magbend.rig.verify import verify_run
+from magbend.rig.runs.control import RunControl
+from magbend.rig.runs.read import read_run
+from magbend.rig.runs.runner import run
+from magbend.rig.runs.verify import verify_run
+from magbend.rig.stage.protocol import InterlockError, LinkLostError
 
 
 def test_a_run_records_every_step_and_verifies(bench, tmp_path: Path) -> None:
@@ -89,11 +89,11 @@ def test_ctrl_c_in_each_phase_holds_and_ends_as_abort(
     elif phase == "move":
         bench.raw.before = lambda c: interrupt() if c.startswith("move -90") else None
     elif phase == "settle":
-        monkeypatch.setattr("magbend.rig.runner.settle", interrupt)
+        monkeypatch.setattr("magbend.rig.runs.runner.settle", interrupt)
     elif phase == "flux":
         bench.meter.read_flux = interrupt
     else:
-        monkeypatch.setattr("magbend.rig.runner.grab_median", interrupt)
+        monkeypatch.setattr("magbend.rig.runs.runner.grab_median", interrupt)
     summary = run(bench.plan, bench.devices, out)
     assert summary.status == "abort"
     assert bench.raw.calls[-1] == "hold"
@@ -156,7 +156,7 @@ def test_retract_policy_moves_away_after_the_ending(
     bench, tmp_path: Path, plan_file: Path
 ) -> None:
     plan_file.write_text(plan_file.read_text() + '[abort]\npolicy = "retract"\n')
-    from magbend.rig.config import read_plan
+    from magbend.rig.bench.config import read_plan
 
     def before(call: str) -> None:
         if call == "move -90":

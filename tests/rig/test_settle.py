@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from magbend.core.errors import CameraError
-from magbend.rig.camera import Frame
+from magbend.rig.bench.config import SettleConfig
+from magbend.rig.camera.protocol import Frame
 from magbend.rig.clock import SteppedClock
-from magbend.rig.config import SettleConfig
-from magbend.rig.settle import change_percent, settle
+from magbend.rig.runs.settle import change_percent, settle
 from magbend.rig.virtual.camera import VirtualCamera
 
 CONFIG = SettleConfig(

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from magbend.rig.interrupts import StopAtOnce
-from magbend.rig.stage import (
+from magbend.rig.stage.protocol import (
     AlarmError,
     LinkLostError,
     PositionLostError,
@@ -15,7 +15,7 @@ from magbend.rig.stage import (
     StageTimeoutError,
     StoppedError,
 )
-from magbend.rig.virtual.plant import Plant
+from magbend.rig.virtual.board.plant import Plant
 
 from .stage_bench import StageBench, homed_bench, interrupt, make_bench
 

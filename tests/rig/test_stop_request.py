@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from magbend.core.errors import ConfigError
-from magbend.rig.presence import Presence
-from magbend.rig.rig_file_edit import replace_gap_at_zero
-from magbend.rig.stage import StageTimeoutError
-from magbend.rig.stop_request import stop_from_outside
+from magbend.rig.bench.file_edit import replace_gap_at_zero
+from magbend.rig.stage.presence import Presence
+from magbend.rig.stage.protocol import StageTimeoutError
+from magbend.rig.stage.stop_request import stop_from_outside
 
 from .stage_bench import homed_bench
 

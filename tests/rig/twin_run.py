@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from magbend.cli.keys import terminating
+from magbend.rig.bench.config import read_plan
 from magbend.rig.clock import SteppedClock
-from magbend.rig.config import read_plan
 from magbend.rig.link import WireLog
-from magbend.rig.runner import run
+from magbend.rig.runs.runner import run
 from magbend.rig.virtual.bench import open_twin
 
 GENERATOR = np.random.default_rng(8)

@@ -1,0 +1,99 @@
+from .bench.config import (
+    Plan as Plan,
+)
+from .bench.config import (
+    RigModel as RigModel,
+)
+from .bench.config import (
+    read_plan as read_plan,
+)
+from .bench.config import (
+    read_rig as read_rig,
+)
+from .bench.devices import (
+    Devices as Devices,
+)
+from .bench.open import (
+    open_devices as open_devices,
+)
+from .clock import (
+    Clock as Clock,
+)
+from .clock import (
+    ScaledClock as ScaledClock,
+)
+from .clock import (
+    SteppedClock as SteppedClock,
+)
+from .clock import (
+    SystemClock as SystemClock,
+)
+from .link import (
+    WireLog as WireLog,
+)
+from .ports import (
+    PortInfo as PortInfo,
+)
+from .ports import (
+    list_ports as list_ports,
+)
+from .runs.read import (
+    Run as Run,
+)
+from .runs.read import (
+    read_run as read_run,
+)
+from .runs.runner import (
+    RunSummary as RunSummary,
+)
+from .runs.runner import (
+    run as run,
+)
+from .runs.verify import (
+    verify_run as verify_run,
+)
+from .stage.config import (
+    LimitsConfig as LimitsConfig,
+)
+from .stage.config import (
+    StageConfig as StageConfig,
+)
+from .stage.gap import (
+    GapStage as GapStage,
+)
+from .stage.gap import (
+    GapStatus as GapStatus,
+)
+from .stage.gap import (
+    MoveRecord as MoveRecord,
+)
+from .stage.grbl.stage import (
+    GrblStage as GrblStage,
+)
+from .stage.make import (
+    make_stage as make_stage,
+)
+from .stage.marlin.stage import (
+    MarlinStage as MarlinStage,
+)
+from .stage.protocol import (
+    AlarmError as AlarmError,
+)
+from .stage.protocol import (
+    InterlockError as InterlockError,
+)
+from .stage.protocol import (
+    LinkLostError as LinkLostError,
+)
+from .stage.protocol import (
+    PositionLostError as PositionLostError,
+)
+from .stage.protocol import (
+    Stage as Stage,
+)
+from .stage.protocol import (
+    StageTimeoutError as StageTimeoutError,
+)
+from .stage.protocol import (
+    StoppedError as StoppedError,
+)

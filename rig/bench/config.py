@@ -1,0 +1,266 @@
+"""The rig file and the plan file: TOML in, checked before anything moves.
+
+A rig file says what stands on the bench; a plan says what is to be done with it. Paths
+inside a file are relative to that file.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
+
+from ...core.errors import ConfigError
+from ...core.magnet import Vector
+from ...core.specimen import Specimen
+from ...core.specimen_file import MagnetModel, SpecimenModel, read_specimen
+from ...core.toml import FileModel, line_of, read_text, read_toml
+from ...core.units import GRAVITY_M_PER_S2
+from ..stage.config import LimitsConfig, StageConfig
+from .twin_config import TwinConfig
+
+
+class CameraConfig(FileModel):
+    """The ``[camera]`` table: where pictures come from and how long they may take."""
+
+    backend: Literal["auto", "opencv", "mjpeg", "folder", "video", "twin"] = "auto"
+    source: str | int = 0
+    watch: bool = False
+    width_px: PositiveInt | None = None
+    height_px: PositiveInt | None = None
+    exposure: float | None = None
+    gain: float | None = None
+    white_balance_K: PositiveFloat | None = None
+    frame_timeout_s: PositiveFloat = 5.0
+    latency_s: NonNegativeFloat = 0.2
+    warmup_s: NonNegativeFloat = 1.0
+    brightness_drift_percent: PositiveFloat = 3.0
+
+
+class MeterConfig(FileModel):
+    """The ``[meter]`` table: which Tesla-meter, and on which port."""
+
+    driver: str = "manual"
+    port: str = ""
+    description: Path | None = None
+    zero_mT: float = 0.0
+    sign: Literal[-1, 1] = 1
+
+
+class SettleConfig(FileModel):
+    """The ``[settle]`` table: when the rod counts as still."""
+
+    time_s: NonNegativeFloat = 2.0
+    image_change_percent: PositiveFloat = 0.02
+    frames: int = Field(default=5, ge=2)
+    window_s: NonNegativeFloat = 0.5
+    timeout_s: PositiveFloat = 30.0
+
+
+class PhotographConfig(FileModel):
+    """The ``[photograph]`` table: how many frames make one photograph (median)."""
+
+    frames: int = Field(default=3, ge=1, le=99)
+
+
+class FluxConfig(FileModel):
+    """The ``[flux]`` table: how many readings make one flux density."""
+
+    samples: int = Field(default=5, ge=1, le=10_000)
+
+
+class AbortConfig(FileModel):
+    """The ``[abort]`` table: stay where it is, or retract from the magnet."""
+
+    policy: Literal["hold", "retract"] = "hold"
+
+
+class BenchModel(FileModel):
+    """The ``[bench]`` table: how the bench stands.
+
+    `up` points upward in the specimen frame (x along the undeformed rod, z toward the
+    camera); its length does not matter.
+    """
+
+    up: Vector
+
+    def model_post_init(self, _context: object) -> None:
+        """Check that there is a direction."""
+        length = math.hypot(*self.up)
+        if not 0.0 < length < math.inf:
+            raise ValueError("up must be a direction, such as [0.0, 0.0, 1.0]")
+
+    def gravity_m_s2(self, specimen: Specimen) -> Vector:
+        """Return the weight of a rod a kilogram, in m/s2; none without its density."""
+        if specimen.density_kg_m3 is None:
+            return (0.0, 0.0, 0.0)
+        scale = -GRAVITY_M_PER_S2 / math.hypot(*self.up)
+        x, y, z = self.up
+        return (scale * x + 0.0, scale * y + 0.0, scale * z + 0.0)  # no -0.0
+
+
+class RigModel(FileModel):
+    """A rig file."""
+
+    name: str = "bench"
+    bench: BenchModel | None = None
+    stage: StageConfig
+    limits: LimitsConfig
+    camera: CameraConfig = CameraConfig()
+    meter: MeterConfig = MeterConfig()
+    magnet: MagnetModel | None = None
+    settle: SettleConfig | None = None
+    twin: TwinConfig = TwinConfig()
+
+
+class PlanModel(FileModel):
+    """A plan file that names the file of its specimen."""
+
+    name: str
+    operator: str = ""
+    notes: str = ""
+    specimen: Path
+    rig: Path
+    gaps_mm: list[PositiveFloat] = Field(min_length=1, max_length=1000)
+    settle: SettleConfig | None = None
+    photograph: PhotographConfig = PhotographConfig()
+    flux: FluxConfig = FluxConfig()
+    abort: AbortConfig = AbortConfig()
+
+
+class InlinePlanModel(PlanModel):
+    """A plan file that describes its specimen itself, in a ``[specimen]`` table."""
+
+    specimen: SpecimenModel  # type: ignore[assignment]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """A plan with its rig and its specimen read and checked against each other.
+
+    Parameters
+    ----------
+    path, text : Path and str
+        The plan file and what it says.
+    model : PlanModel
+        The plan as typed.
+    rig : RigModel
+        The rig it runs on.
+    rig_path : Path
+        Where the rig file is.
+    specimen : Specimen
+        The rod on the stage.
+    settle : SettleConfig
+        From the plan, else from the rig file, else the defaults.
+    """
+
+    path: Path
+    text: str
+    model: PlanModel
+    rig: RigModel
+    rig_path: Path
+    specimen: Specimen
+    settle: SettleConfig
+
+    @property
+    def gaps_mm(self) -> tuple[float, ...]:
+        """The gaps in the order in which they are approached, in mm."""
+        return tuple(self.model.gaps_mm)
+
+    @property
+    def gravity_m_s2(self) -> Vector:
+        """Free fall in the specimen frame, in m/s2; zero if the weight is not known."""
+        bench = self.rig.bench
+        return bench.gravity_m_s2(self.specimen) if bench else (0.0, 0.0, 0.0)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the plan as the manifest of a run keeps it, defaults written out."""
+        data = self.model.model_dump(mode="json")
+        data.pop("specimen")
+        data["rig"] = self.rig_path.name
+        data["settle"] = self.settle.model_dump(mode="json")
+        return data
+
+
+def read_rig(path: Path) -> RigModel:
+    """Read a rig file.
+
+    Raises
+    ------
+    ConfigError
+        One sentence with file, line and key.
+    """
+    return read_toml(path, RigModel)
+
+
+def read_plan(path: Path) -> Plan:
+    """Read a plan file with the rig and the specimen that it names.
+
+    Raises
+    ------
+    ConfigError
+        One sentence with file, line and key, if a file is missing or wrong, a gap is
+        asked for twice, out of order, or closer than the interlock allows.
+    """
+    text = read_text(path)
+    # Two models instead of a union: its errors would not name key and line.
+    is_inline = re.search(
+        r"^\s*(\[\s*specimen\b|specimen\s*=\s*\{)", text, re.MULTILINE
+    )
+    model = read_toml(path, InlinePlanModel if is_inline else PlanModel)
+    rig_path = (path.parent / model.rig).resolve()
+    rig = read_rig(rig_path)
+    if isinstance(model, InlinePlanModel):
+        specimen = model.specimen.specimen()
+    else:
+        specimen = read_specimen((path.parent / model.specimen).resolve())
+    _check_gaps(path, text, model, rig, rig_path)
+    return Plan(
+        path=path, text=text, model=model, rig=rig, rig_path=rig_path,
+        specimen=specimen, settle=model.settle or rig.settle or SettleConfig(),
+    )  # fmt: skip
+
+
+def _check_gaps(
+    path: Path, text: str, model: PlanModel, rig: RigModel, rig_path: Path
+) -> None:
+    line = line_of(text, ("gaps_mm",))
+    where = f"{path}, line {line}" if line else f"{path}"
+    before = math.inf
+    for index, gap_mm in enumerate(model.gaps_mm):
+        named = f"gaps_mm[{index}] = {gap_mm:g} mm"
+        found = _why_not_there(gap_mm, rig)
+        if found:
+            reason, keys = found
+            raise ConfigError(f"{where}: {named} {reason} ({rig_path.name}, {keys})")
+        if gap_mm >= before:
+            raise ConfigError(
+                f"{where}: gaps_mm must fall, so that the magnet is approached from "
+                f"the far side only; instead {named} follows {before:g} mm"
+            )
+        before = gap_mm
+
+
+def _why_not_there(gap_mm: float, rig: RigModel) -> tuple[str, str] | None:
+    """Return why a gap is out of bounds, and the keys that say so."""
+    stage, limits = rig.stage, rig.limits
+    if gap_mm < limits.min_gap_mm:
+        low = f"{limits.min_gap_mm:g} mm"
+        return f"is under the interlock of {low}", "limits.min_gap_mm"
+    if gap_mm > limits.max_gap_mm:
+        high = f"{limits.max_gap_mm:g} mm"
+        return f"is beyond the largest gap of {high}", "limits.max_gap_mm"
+    # Boards count from a switch, into the negative or into the positive.
+    machine_mm = abs(gap_mm - stage.gap_at_zero_mm)
+    has_switches = stage.homing == "switches"
+    if has_switches and stage.travel_mm is not None and machine_mm > stage.travel_mm:
+        return (
+            f"lies {machine_mm:g} mm from the machine's zero, beyond its travel of "
+            f"{stage.travel_mm:g} mm",
+            "stage.travel_mm, gap_at_zero_mm",
+        )
+    return None

@@ -1,0 +1,53 @@
+"""The devices of one bench, open together and closed together."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from ...core.errors import MagbendError
+from ..camera.protocol import Camera
+from ..clock import Clock
+from ..meter.protocol import Meter
+from ..stage.gap import GapStage
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Devices:
+    """An open stage, camera and Tesla-meter, and the clock that they share."""
+
+    stage: GapStage
+    camera: Camera
+    meter: Meter
+    clock: Clock
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the devices do but a bench should not: sentences for people."""
+        return (*self.stage.identity.notes, *self.camera.identity.get("notes", ()))
+
+    def utc(self) -> str:
+        """Return the UTC time of the bench's clock, ISO 8601 with milliseconds."""
+        text = self.clock.utc().isoformat(timespec="milliseconds")
+        return text.replace("+00:00", "Z")
+
+    def close(self) -> None:
+        """Let every device go, also when one of them refuses."""
+        for device in (self.camera, self.meter, self.stage):
+            try:
+                device.close()
+            except MagbendError as error:
+                logger.warning("%s", error)
+
+
+@contextlib.contextmanager
+def closing_all(devices: Devices) -> Iterator[Devices]:
+    """Close the devices at the end of a ``with`` block, however it ends."""
+    try:
+        yield devices
+    finally:
+        devices.close()

@@ -1,0 +1,1 @@
+"""Tesla-meters, described in TOML."""

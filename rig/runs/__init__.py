@@ -1,0 +1,1 @@
+"""Runs: the runner, the run folder, reading, checking and resuming it."""

@@ -1,0 +1,1 @@
+"""The stage: what it promises, where it stands, what stops it."""

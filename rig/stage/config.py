@@ -1,0 +1,85 @@
+"""The tables ``[stage]`` and ``[limits]`` of the rig file."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from ...core.toml import FileModel
+
+PositiveNumber = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+
+
+class StageConfig(FileModel):
+    """How the stage is reached, what its controller must be set to, and its map.
+
+    The map is ``gap_mm = gap_at_zero_mm + direction * machine_mm``.
+    """
+
+    driver: Literal["grbl", "marlin"] = "grbl"
+    port: str = "auto"
+    baud: int = Field(default=115200, gt=0)
+    axis: Literal["X", "Y", "Z"] = "X"
+    gap_at_zero_mm: float
+    direction: Literal[1, -1] = 1
+    feed_mm_min: PositiveNumber = 300.0
+    backlash_mm: NotNegative = 0.5
+    piece_mm: PositiveNumber = 10.0
+    homing: Literal["switches", "manual"] = "switches"
+    home_command: str = "$H"
+    home_timeout_s: PositiveNumber | None = None
+    busy_factor: Annotated[float, Field(ge=1.0)] = 4.0
+    answer_timeout_s: PositiveNumber = 3.0
+    boot_s: NotNegative = 5.0
+    reset_on_connect: bool = True
+    dtr: bool | None = None
+    steps_per_mm: PositiveNumber | None = None
+    travel_mm: PositiveNumber | None = None
+    max_feed_mm_min: PositiveNumber | None = None
+    acceleration_mm_s2: PositiveNumber | None = None
+    settings: dict[str, float] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _home_command_is_a_homing(self) -> StageConfig:
+        allowed = ("$H", f"$H{self.axis}")
+        if self.driver == "grbl" and self.home_command not in allowed:
+            raise ValueError(
+                f"home_command must be '$H' (all axes) or '$H{self.axis}' (stage.axis "
+                f"alone); instead received {self.home_command!r}"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _settings_are_of_the_driver(self) -> StageConfig:
+        if self.driver == "marlin" and self.settings:
+            raise ValueError(
+                "[stage.settings] lists the $ numbers of GRBL; a Marlin board has none"
+            )
+        return self
+
+
+class LimitsConfig(FileModel):
+    """Where the stage may go, as gaps in mm from the magnet's N face.
+
+    `min_gap_mm` is the interlock. `contact_gap_mm` is the gap at which something
+    touches (zero: the rod's undeformed tip reaches the face): between the two the
+    stage must be able to stop from full speed.
+    """
+
+    min_gap_mm: NotNegative
+    max_gap_mm: PositiveNumber
+    contact_gap_mm: float = 0.0
+    retract_gap_mm: PositiveNumber | None = None
+
+    @model_validator(mode="after")
+    def _ordered(self) -> LimitsConfig:
+        if self.max_gap_mm <= self.min_gap_mm:
+            raise ValueError("max_gap_mm must be above min_gap_mm")
+        if self.contact_gap_mm > self.min_gap_mm:
+            raise ValueError("contact_gap_mm must not be above min_gap_mm")
+        retract = self.retract_gap_mm
+        if retract is not None and not self.min_gap_mm <= retract <= self.max_gap_mm:
+            raise ValueError("retract_gap_mm must be from min_gap_mm to max_gap_mm")
+        return self

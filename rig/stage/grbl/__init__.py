@@ -1,0 +1,1 @@
+"""Stages that speak GRBL, and its relatives."""

@@ -1,0 +1,146 @@
+"""Find out who answers on an open link, and in which state, without moving anything."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ....core.errors import StageError
+from ...clock import Clock
+from ..config import StageConfig
+from ..protocol import StageTimeoutError
+from .protocol import FEED_HOLD, Message, Report, Setting
+from .session import CommandRefusedError, GrblSession
+
+_RESET_TRIES = 3
+_MOVING_STATES = ("run", "jog")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FoundBoard:
+    """What a board said when it was connected.
+
+    Attributes
+    ----------
+    banner : str
+        The start-up line, or the version if none was seen.
+    details : tuple of str
+        Answers to ``$I``, ``$G`` and ``$#``, as ``KIND:text``.
+    settings : mapping
+        ``$$``: number without the dollar sign to value as text.
+    undisturbed : bool
+        The board had been standing idle and did not restart on opening: if it was
+        homed before, it still is.
+    """
+
+    banner: str
+    details: tuple[str, ...]
+    settings: Mapping[str, str]
+    undisturbed: bool
+
+
+def connect_board(
+    session: GrblSession, clock: Clock, config: StageConfig
+) -> FoundBoard:
+    """Wait for the board, bring it to a stand and in step, and question it.
+
+    Raises
+    ------
+    StageError
+        If nobody answers as GRBL does, or what answers cannot be questioned.
+    """
+    report = _first_report(session, clock, config)
+    undisturbed = session.restarts == 0 and report is not None
+    undisturbed = undisturbed and report is not None and report.state == "idle"
+    if report is not None and _moving(report):
+        report = _wait_for_stand(session, clock, config)
+    if config.reset_on_connect or report is None or report.state != "idle":
+        _reset(session, config)
+    _refuse_open_door(session)
+    restarts = session.restarts
+    details = _ask_details(session)
+    settings = {
+        line.name: line.value
+        for line in session.command("$$", timeout_s=3.0 * config.answer_timeout_s)
+        if isinstance(line, Setting)
+    }
+    if not settings:
+        raise StageError("the board answers, but reports no settings to $$")
+    report = session.ask_place(config.answer_timeout_s)
+    if session.restarts != restarts:
+        raise StageError("the board restarts again and again; look at its power supply")
+    if report is None:
+        raise StageError(
+            f"the board ({session.banner or 'no banner'}) answers, but sends no status "
+            "report as GRBL 1.1 does; older versions cannot jog ($J=): update it"
+        )
+    version = next((d for d in details if d.startswith("VER:")), "unknown firmware")
+    return FoundBoard(
+        banner=session.banner or version,
+        details=details,
+        settings=settings,
+        undisturbed=undisturbed,
+    )
+
+
+def _first_report(
+    session: GrblSession, clock: Clock, config: StageConfig
+) -> Report | None:
+    """Ask until the board answers: it may be booting, homing or deaf."""
+    deadline_s = clock.monotonic_s() + config.boot_s
+    while True:
+        report = session.ask(0.5)
+        if report is not None:
+            return report
+        if session.alarm is not None or clock.monotonic_s() >= deadline_s:
+            return None
+
+
+def _moving(report: Report) -> bool:
+    # Home is not among them: a running cycle answers nothing, and a board that is
+    # stuck in Home needs a reset; a feed hold would hide that its position is lost.
+    return report.state in _MOVING_STATES or (
+        report.state == "hold" and report.substate != 0
+    )
+
+
+def _wait_for_stand(
+    session: GrblSession, clock: Clock, config: StageConfig
+) -> Report | None:
+    """Bring to a stand what an earlier program left moving."""
+    session.realtime(FEED_HOLD)
+    deadline_s = clock.monotonic_s() + 5.0 * config.busy_factor
+    report = session.report
+    while clock.monotonic_s() < deadline_s:
+        report = session.ask()
+        if report is None or not _moving(report):
+            return report
+        clock.sleep(0.1)
+    return report
+
+
+def _refuse_open_door(session: GrblSession) -> None:
+    if session.report is not None and session.report.state == "door":
+        raise StageError(
+            "the board is in Door: its safety door input is open, and it takes no line "
+            "until that closes; close it, or tie the input off, then connect again"
+        )
+
+
+def _reset(session: GrblSession, config: StageConfig) -> None:
+    if not session.reset(tries=_RESET_TRIES):
+        raise StageTimeoutError(
+            "nobody answers as GRBL does: look at the cable, the power, the port and "
+            f"stage.baud (now {config.baud})"
+        )
+
+
+def _ask_details(session: GrblSession) -> tuple[str, ...]:
+    found: list[str] = []
+    for query in ("$I", "$G", "$#"):
+        try:
+            lines = session.command(query)
+        except CommandRefusedError:
+            continue  # a dialect that lacks it is still a stage
+        found += [f"{m.kind}:{m.text}" for m in lines if isinstance(m, Message)]
+    return tuple(found)

@@ -1,0 +1,242 @@
+"""The conversation with a GRBL board: one line in flight, and what is known of it.
+
+Replies carry no number, so order is everything. After any anomaly (an alarm, a reply
+that did not come) the two sides are out of step; a soft reset at standstill brings
+them back: replies count anew from the banner.
+"""
+
+from __future__ import annotations
+
+import logging
+
+from ....core.errors import StageError
+from ...clock import Clock
+from ...link import Link
+from ..protocol import AlarmError, PositionLostError, StageTimeoutError
+from .protocol import (
+    SOFT_RESET,
+    STATUS,
+    Alarm,
+    Banner,
+    Line,
+    Message,
+    Ok,
+    Refusal,
+    Report,
+    Triple,
+    alarm_text,
+    error_text,
+    machine_position,
+    parse_line,
+)
+
+logger = logging.getLogger(__name__)
+
+_RESET_TRIES = 8
+_BANNER_S = 2.5
+_PATIENCE = 10.0
+_OFFSET_EVERY = 30
+_SILENT_ASKS = 3
+_DEAF_ALARMS = (1, 2)
+
+
+class CommandRefusedError(StageError):
+    """The board answered ``error:N``."""
+
+    def __init__(self, line: str, code: str) -> None:
+        super().__init__(
+            f"the stage refused {line!r}: error:{code}, {error_text(code)}"
+        )
+        self.code = code
+
+
+class GrblSession:
+    """Talk to one board over an open link.
+
+    Attributes
+    ----------
+    report : Report or None
+        The last report.
+    alarm : int or None
+        The alarm that locks the board, if its number is known.
+    restarts : int
+        Banners that nobody had asked for.
+    in_step : bool
+        Whether replies can be matched with lines.
+    """
+
+    def __init__(self, link: Link, clock: Clock, *, answer_timeout_s: float) -> None:
+        self._link = link
+        self._clock = clock
+        self._answer_timeout_s = answer_timeout_s
+        self._offset: Triple | None = None
+        self._reset_pending = False
+        self.report: Report | None = None
+        self.alarm: int | None = None
+        self.restarts = 0
+        self.banner = ""
+        self.in_step = True
+        self.locked_message = False
+
+    @property
+    def deaf(self) -> bool:
+        """Whether the board listens to nothing but a reset (ALARM:1 and 2)."""
+        return self.alarm in _DEAF_ALARMS and not self.locked_message
+
+    def machine(self) -> Triple | None:
+        """Return the last reported machine position of all axes."""
+        if self.report is None:
+            return None
+        return machine_position(self.report, self._offset)
+
+    def realtime(self, byte: bytes) -> None:
+        """Send one real-time byte; it waits for nothing."""
+        self._link.write_realtime(byte)
+
+    def pump(self, timeout_s: float) -> Line | None:
+        """Read and note one line; None when time is up."""
+        text = self._link.read_line(max(timeout_s, 0.0))
+        return None if text is None else self._note(parse_line(text))
+
+    def drain(self) -> None:
+        """Note everything that is already here; stray ``ok``s fall away."""
+        while (text := self._link.waiting_line()) is not None:
+            self._note(parse_line(text))
+
+    def command(self, line: str, *, timeout_s: float | None = None) -> list[Line]:
+        """Send one line and return what came before its ``ok``.
+
+        Raises
+        ------
+        CommandRefusedError
+            The board answered ``error:N``.
+        AlarmError
+            It raised an alarm instead.
+        PositionLostError
+            It restarted instead.
+        StageTimeoutError
+            It did not answer; the conversation is out of step.
+        """
+        self.drain()
+        limit_s = self._answer_timeout_s if timeout_s is None else timeout_s
+        self.in_step = False  # until the reply is here
+        self._link.write(line.encode("ascii") + b"\n")
+        end_s = self._clock.monotonic_s() + _PATIENCE * limit_s
+        restarts, lines = self.restarts, list[Line]()
+        while True:
+            # A board that still talks is not late: each line gives it time anew.
+            answer = self.pump(min(limit_s, end_s - self._clock.monotonic_s()))
+            if answer is None:
+                raise StageTimeoutError(
+                    f"the stage did not answer {line!r} within {limit_s:.0f} s"
+                )
+            if isinstance(answer, Ok):
+                self.in_step = True
+                return lines
+            if isinstance(answer, Refusal):
+                self.in_step = True
+                raise CommandRefusedError(line, answer.code)
+            if isinstance(answer, Alarm):
+                raise self.alarm_error(answer.code)
+            self.raise_if_restarted(restarts)
+            lines.append(answer)
+
+    def raise_if_restarted(self, restarts: int) -> None:
+        """Raise if the board restarted since `restarts` was noted.
+
+        Raises
+        ------
+        PositionLostError
+            As it says.
+        """
+        if self.restarts != restarts:
+            raise PositionLostError(
+                "the board restarted by itself (power, reset button or a loose cable); "
+                "its position is lost; home it (magbend rig home)"
+            )
+
+    @staticmethod
+    def alarm_error(code: int) -> AlarmError:
+        """Return the error of an alarm number, with meaning and remedy."""
+        text = alarm_text(code)
+        return AlarmError(
+            code, text.meaning, text.remedy, position_kept=text.position_kept
+        )
+
+    def ask(self, timeout_s: float = 1.0) -> Report | None:
+        """Send ``?`` and return the report, or None: one missing answer is no fault."""
+        self.drain()
+        self._link.write_realtime(STATUS)
+        deadline_s = self._clock.monotonic_s() + timeout_s
+        while True:
+            line = self.pump(deadline_s - self._clock.monotonic_s())
+            if line is None or isinstance(line, (Report, Alarm, Banner)):
+                return line if isinstance(line, Report) else None
+
+    def ask_place(self, timeout_s: float) -> Report | None:
+        """Ask until the machine position is known.
+
+        A board that reports WPos tells its offset in some reports only: every tenth at
+        rest, every thirtieth in motion. Three missing answers in a row are a silence.
+        """
+        report, missing = None, 0
+        for _ in range(_OFFSET_EVERY):
+            report = self.ask(timeout_s)
+            missing = 0 if report else missing + 1
+            if missing == _SILENT_ASKS or (report and self.machine() is not None):
+                break
+        return report
+
+    def reset(self, *, tries: int = _RESET_TRIES) -> bool:
+        """Soft-reset until the banner comes; replies count anew from there.
+
+        In Idle, Hold:0 and Alarm the board keeps its position. A reset in the half
+        second after ALARM:1 or 2 is swallowed, so it is repeated, at once when the
+        board asks for it.
+
+        Parameters
+        ----------
+        tries : int
+            How often it is sent at most.
+
+        Returns
+        -------
+        bool
+            Whether the banner came.
+        """
+        self._reset_pending = True
+        try:
+            return any(self._reset_once() for _ in range(tries))
+        finally:
+            self._reset_pending = False
+
+    def _reset_once(self) -> bool:
+        self._link.write_realtime(SOFT_RESET)
+        deadline_s = self._clock.monotonic_s() + _BANNER_S
+        while (left_s := deadline_s - self._clock.monotonic_s()) > 0.0:
+            line = self.pump(left_s)
+            if isinstance(line, Banner):
+                self.in_step = True
+                self.ask()  # also reads the lock message that follows the banner
+                return True
+            if isinstance(line, Message) and "Reset to continue" in line.text:
+                return False
+        return False
+
+    def _note(self, line: Line) -> Line:
+        if isinstance(line, Report):
+            self.report = line
+            self._offset = line.offset or self._offset
+            if line.state not in ("alarm", "home"):
+                self.alarm, self.locked_message = None, False
+        elif isinstance(line, Alarm):
+            logger.warning("stage: ALARM:%d", line.code)
+            self.alarm, self.in_step, self.locked_message = line.code, False, False
+        elif isinstance(line, Banner):
+            self.banner, self._offset = line.text, None
+            self.in_step = True
+            if not self._reset_pending:
+                self.restarts += 1
+        elif isinstance(line, Message) and "unlock" in line.text:
+            self.locked_message = "to unlock" in line.text
+        return line

@@ -1,0 +1,352 @@
+"""A GRBL 1.1 board (also grblHAL, FluidNC) as a `Stage`.
+
+Motions are absolute jogs in machine coordinates: a jog is refused as a whole when it
+leaves the travel, changes no modal state, and a feed hold forgets it. Arrival is Idle
+*and* the position; an ``ok`` only means queued.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from typing import NoReturn
+
+from ....core.errors import StageError
+from ...link import Link
+from ..protocol import (
+    AlarmError,
+    InterlockError,
+    LinkLostError,
+    Moved,
+    PositionLostError,
+    StageIdentity,
+    StageStatus,
+    StageTimeoutError,
+    StoppedError,
+)
+from ..serial import MARGIN_S, STOPPED, SerialStage
+from . import audit as grbl_audit
+from .connect import FoundBoard, connect_board
+from .motion import Target, await_arrival, await_homing, await_stand, stands
+from .protocol import FEED_HOLD, SOFT_RESET, Report, alarm_text, jog_line
+from .ready import (
+    make_ready,
+    note,
+    require_open_switch,
+    require_unlocked,
+    reset_standing,
+    wait_for_report,
+)
+from .session import CommandRefusedError, GrblSession
+
+
+class GrblStage(SerialStage[GrblSession]):
+    """One axis of a GRBL board; made as `SerialStage` is."""
+
+    _undisturbed = False
+
+    def _meet(self, link: Link) -> GrblSession:
+        config = self._config
+        session = GrblSession(
+            link, self._clock, answer_timeout_s=config.answer_timeout_s
+        )
+        found = connect_board(session, self._clock, config)
+        problem = grbl_audit.audit(found.settings, config)
+        problem = problem or grbl_audit.audit_build(
+            found.settings, found.details, config
+        )
+        if problem:
+            raise StageError(f"the stage on {link.port} does not fit: {problem}")
+        self._take_in(session, found, link.port)
+        return session
+
+    def _take_in(self, session: GrblSession, found: FoundBoard, port: str) -> None:
+        """Keep what the board said; believe its position if nobody disturbed it."""
+        config = self._config
+        self._limits = grbl_audit.limits_of(found.settings, found.details, config)
+        self._identity = StageIdentity(
+            driver="grbl",
+            firmware=found.banner,
+            port=port,
+            details=found.details,
+            settings=found.settings,
+            notes=tuple(grbl_audit.notes(found.settings, config)),
+        )
+        self._trust.watch(session)
+        self._undisturbed = found.undisturbed
+        left_at = self._presence.recall() if self._presence else None
+        where = left_at if found.undisturbed else None
+        if where and self._trust.is_at(session, where, self._limits.tolerance_mm):
+            self._trust.confirm(session)
+
+    def home(self) -> None:
+        """Run the homing cycle of the board and wait for its end.
+
+        Raises
+        ------
+        AlarmError
+            If a switch was not found, stayed closed, or the cycle was cut off.
+        StageTimeoutError
+            If it does not end in time; the board is reset.
+        """
+        session = self._require_session()
+        self._require_switches()
+        self._make_ready(session)
+        limit_s = self._config.home_timeout_s or self._config.busy_factor * (
+            grbl_audit.homing_time_s(self.identity.settings)
+        )
+        self._trust.lose()
+        with self._stand_if_interrupted(at_once=True):
+            session.drain()
+            self._require_link().write(self._config.home_command.encode() + b"\n")
+            await_homing(
+                session,
+                self._clock,
+                limit_s,
+                command=self._config.home_command,
+                check_stop=self._stop_homing_if_asked,
+            )
+        report = self._wait_for_report(session)
+        if report.state != "idle":
+            raise StageError(f"after homing the stage is in {report.state}, not idle")
+        session.alarm = None
+        self._trust.confirm(session)
+
+    def _stop_homing_if_asked(self) -> None:
+        if self.stop_requested():
+            self.stop()
+            raise StoppedError(STOPPED)
+
+    def _standing_mm(self) -> float:
+        report = self._wait_for_report(self._require_session())
+        here = self._machine_mm()
+        if report.state != "idle" or here is None:
+            way_out = (
+                "home it, or magbend rig unlock"
+                if report.state == "alarm"
+                else ("wait for it, or stop it first (magbend rig stop)")
+            )
+            raise StageError(
+                f"the stage must be idle; it is in {report.state}: {way_out}"
+            )
+        return here
+
+    def _ready_mm(self) -> float:
+        session = self._require_session()
+        self._make_ready(session)
+        require_unlocked(session)
+        self._trust.require(session, self.limits.tolerance_mm)
+        require_open_switch(session, self._config.axis)
+        here = self._machine_mm()
+        if here is None:
+            raise PositionLostError("the stage does not report its position; home it")
+        return here
+
+    def status(self) -> StageStatus:
+        """Ask the board; no answer is the state ``silent``."""
+        session = self._require_session()
+        report = session.ask()
+        note(session, self._trust)
+        code = session.alarm
+        state = report.state if report else "silent" if code is None else "alarm"
+        return StageStatus(
+            state=state,  # type: ignore[arg-type]
+            substate=report.substate if report else None,
+            machine_mm=self._machine_mm() if report or session.deaf else None,
+            position_state=self._trust.state,
+            feed_mm_min=report.feed if report else 0.0,
+            alarm=code,
+            trouble=session.alarm_error(code) if code is not None else None,
+            pins=report.pins if report else "",
+            raw=report.raw if report else "",
+        )
+
+    def listen(self) -> None:
+        """Take in what the board says unasked; nothing is sent.
+
+        Raises
+        ------
+        AlarmError, PositionLostError, LinkLostError
+            If it raised an alarm, restarted, or is gone.
+        """
+        session = self._require_session()
+        restarts = session.restarts
+        session.drain()
+        note(session, self._trust)
+        if session.alarm is not None:
+            raise session.alarm_error(session.alarm)
+        session.raise_if_restarted(restarts)
+
+    def hold(self) -> None:
+        """Feed hold, wait for standstill, forget the rest; the position stays good.
+
+        Raises
+        ------
+        StageTimeoutError
+            If the board does not say that it stands; it is reset, and the position is
+            ``unverified``.
+        """
+        session = self._require_session()
+        session.realtime(FEED_HOLD)
+        try:
+            self._await_hold(session)
+        finally:
+            self._stop_is_met()
+
+    def _await_hold(self, session: GrblSession) -> None:
+        speed_mm_s = self.limits.max_feed_mm_min / 60.0
+        stopping_s = speed_mm_s / self.limits.acceleration_mm_s2
+        limit_s = MARGIN_S + self._config.busy_factor * stopping_s
+        report = await_stand(session, self._clock, limit_s)
+        if report is not None:
+            if report.state == "hold" or not session.in_step:
+                reset_standing(session, self._trust)
+            self._trust.stands(session)
+            return
+        self._trust.doubt()
+        note(session, self._trust)
+        session.reset()
+        raise StageTimeoutError(
+            "the stage did not come to a stop that it could report; it was reset; "
+            "home it (magbend rig home)"
+        )
+
+    def stop(self) -> None:
+        """Soft-reset at once; what was moving has lost steps."""
+        session = self._require_session()
+        if session.report is None or not stands(session.report):
+            self._trust.doubt()
+        self._stop_is_met()
+        reset_standing(session, self._trust)
+
+    def _cry_stop(self) -> None:
+        self._require_session().realtime(SOFT_RESET)
+
+    def recover(self) -> None:
+        """Bring the board back: reconnect a lost link, reset an alarmed board.
+
+        The alarm lock stays: home the stage, or unlock it.
+
+        Raises
+        ------
+        StageError
+            If the board does not come back.
+        """
+        if self._link is None or not self._link.is_open:
+            self._reconnect()
+            return
+        session = self._require_session()
+        report = session.ask()
+        if report is not None and not stands(report):
+            self.hold()
+        elif not session.reset():
+            raise StageTimeoutError("the stage does not answer a reset; cut its power")
+        note(session, self._trust)
+
+    def _reconnect(self) -> None:
+        """Open the port again; what had been known of the position is unverified."""
+        before = self._trust.state
+        try:
+            self.connect()
+        except StageError:
+            self._trust.state = before
+            raise
+        trusted = before != "unknown" and self._undisturbed
+        self._trust.state = "unverified" if trusted else "unknown"
+
+    def unlock(self) -> None:
+        """Send ``$X``; the position is ``homed`` only if the alarm kept it."""
+        session = self._require_session()
+        code = session.alarm
+        if session.deaf or not session.in_step:
+            session.reset()
+        session.command("$X")
+        session.alarm, session.locked_message = None, False
+        kept = code is not None and alarm_text(code).position_kept
+        if not kept:
+            self._trust.doubt()
+
+    def close(self) -> None:
+        """Let go of the port; where a homed stage stands is remembered."""
+        session, presence = self._session, self._presence
+        if session and presence and self._link and self._link.is_open:
+            with contextlib.suppress(StageError):
+                report = session.ask()
+                note(session, self._trust)
+                machine = session.machine()
+                idle = report is not None and report.state == "idle"
+                if self._trust.state == "homed" and idle and machine:
+                    presence.remember(machine)
+        self._let_go()
+
+    def _move_piece(self, target_mm: float, feed_mm_min: float, moved: Moved) -> None:
+        session = self._require_session()
+        target = self._target(target_mm, feed_mm_min)
+        restarts = session.restarts
+        try:
+            session.command(jog_line(self._config.axis, target_mm, feed_mm_min))
+            await_arrival(
+                session,
+                self._clock,
+                target,
+                restarts=restarts,
+                check_stop=self._hold_if_asked,
+                moved=moved,
+            )
+        except CommandRefusedError as error:
+            if error.code == "15":
+                raise InterlockError(
+                    f"the board refuses {target_mm:.3f} mm: it lies outside the travel "
+                    "it is set to; nothing moved"
+                ) from None
+            raise
+        except AlarmError:
+            note(session, self._trust)
+            session.reset()
+            raise
+        except PositionLostError:
+            note(session, self._trust)
+            raise
+        except LinkLostError:
+            self._trust.doubt()
+            raise
+        except StageTimeoutError as error:
+            self._give_up(session, error)
+        self._trust.stands(session)
+
+    def _target(self, target_mm: float, feed_mm_min: float) -> Target:
+        """Return where to, how exactly, and how long it may take."""
+        start = self._machine_mm()
+        distance = 0.0 if start is None else target_mm - start
+        return Target(
+            axis=self._axis,
+            start_mm=target_mm - distance,
+            machine_mm=target_mm,
+            tolerance_mm=self.limits.tolerance_mm,
+            limit_s=self._limit_s(distance, feed_mm_min),
+        )
+
+    def _give_up(self, session: GrblSession, error: StageTimeoutError) -> NoReturn:
+        """Bring the stage to a stand after a timeout, and say so."""
+        with contextlib.suppress(StageError):
+            self.hold()
+        self._trust.doubt()
+        if not session.in_step:
+            with contextlib.suppress(StageError):
+                session.reset()
+        raise StageTimeoutError(
+            f"{error}; the stage was stopped and its position is unverified: home it"
+        ) from None
+
+    def _make_ready(self, session: GrblSession) -> None:
+        make_ready(session, self._trust, self._config.answer_timeout_s)
+
+    def _wait_for_report(self, session: GrblSession) -> Report:
+        return wait_for_report(session, self._trust, self._config.answer_timeout_s)
+
+    @property
+    def _axis(self) -> int:
+        return "XYZ".index(self._config.axis)
+
+    def _machine_mm(self) -> float | None:
+        machine = self._session.machine() if self._session else None
+        return machine[self._axis] if machine and len(machine) > self._axis else None

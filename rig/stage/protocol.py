@@ -1,0 +1,241 @@
+"""A stage in its own machine millimetres: protocol, states and errors.
+
+What people use is the gap in front of the magnet; `gap_stage` maps it onto this.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+from ...core.errors import StageError
+
+PositionState = Literal["unknown", "homed", "unverified"]
+"""How far the position can be trusted.
+
+unknown : the board restarted, lost its position, or was never homed: home it.
+unverified : the board still counts, but a move did not end as it should: home it.
+homed : homed since, and every move since ended where it was sent.
+"""
+
+StageState = Literal[
+    "idle", "run", "hold", "jog", "alarm", "home", "check", "door", "sleep", "silent"
+]
+
+
+class AlarmError(StageError):
+    """The controller raised an alarm and refuses motion.
+
+    Parameters
+    ----------
+    code : int
+        The alarm's number, as the firmware gives it.
+    meaning : str
+        What the number means.
+    remedy : str
+        What to do now.
+    position_kept : bool
+        Whether the controller vouches for its position.
+    """
+
+    def __init__(
+        self, code: int, meaning: str, remedy: str, *, position_kept: bool
+    ) -> None:
+        super().__init__(f"the stage raised ALARM:{code} ({meaning}); {remedy}")
+        self.code = code
+        self.meaning = meaning
+        self.remedy = remedy
+        self.position_kept = position_kept
+
+
+class LinkLostError(StageError):
+    """The port is gone: the stage finishes what it had been sent and stops there."""
+
+
+class PositionLostError(StageError):
+    """The stage does not know where it is: motion is refused until it is homed."""
+
+
+class StageTimeoutError(StageError):
+    """The stage did not answer, or did not arrive, in the time the move allows."""
+
+
+class InterlockError(StageError):
+    """A position that is refused before a byte is sent."""
+
+
+class StoppedError(StageError):
+    """A stop was asked for (``magbend rig stop``) while the stage moved."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StageStatus:
+    """What the controller says about itself.
+
+    Attributes
+    ----------
+    state : str
+        One of `StageState`; ``silent`` when it did not answer.
+    substate : int or None
+        Firmware detail, such as 0 (standing) or 1 (slowing down) of ``hold``.
+    machine_mm : float or None
+        Position on the stage's axis in its own frame, in mm.
+    position_state : {"unknown", "homed", "unverified"}
+        How far that number can be trusted.
+    feed_mm_min : float
+        Present speed in mm/min.
+    alarm : int or None
+        The alarm that locks the controller, if any.
+    trouble : StageError or None
+        What keeps the controller from moving, ready to be raised.
+    pins : str
+        Letters of the active inputs: ``X`` is the limit switch of axis X.
+    raw : str
+        The report as it came.
+    """
+
+    state: StageState
+    position_state: PositionState
+    substate: int | None = None
+    machine_mm: float | None = None
+    feed_mm_min: float = 0.0
+    alarm: int | None = None
+    trouble: StageError | None = None
+    pins: str = ""
+    raw: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StageLimits:
+    """What the controller was found to be set to, in mm, mm/min and mm/s2.
+
+    Attributes
+    ----------
+    step_mm : float
+        One motor step.
+    max_feed_mm_min, acceleration_mm_s2 : float
+        Ceilings of the axis.
+    travel_mm : tuple of float or None
+        Lowest and highest machine position, if the controller is homed by switches.
+    switch_mm : float or None
+        Machine position of the switch that homing runs to, if there is one.
+    """
+
+    step_mm: float
+    max_feed_mm_min: float
+    acceleration_mm_s2: float
+    travel_mm: tuple[float, float] | None = None
+    switch_mm: float | None = None
+
+    @property
+    def tolerance_mm(self) -> float:
+        """How far a report may be from its target: a step, and the last digits."""
+        return 1.01 * self.step_mm + 0.002
+
+    def stopping_mm(self, feed_mm_min: float) -> float:
+        """Return the distance from a feed hold to standstill, v^2 / (2 a), in mm."""
+        speed_mm_s = min(feed_mm_min, self.max_feed_mm_min) / 60.0
+        return speed_mm_s**2 / (2.0 * self.acceleration_mm_s2)
+
+    def duration_s(self, distance_mm: float, feed_mm_min: float) -> float:
+        """Return an upper bound of the time of a move from rest to rest, in s."""
+        speed_mm_s = min(feed_mm_min, self.max_feed_mm_min) / 60.0
+        return abs(distance_mm) / speed_mm_s + speed_mm_s / self.acceleration_mm_s2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StageIdentity:
+    """Who answers on the port, for the record of a run."""
+
+    driver: str
+    firmware: str
+    port: str
+    details: tuple[str, ...] = ()
+    settings: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+Moved = Callable[[float], None]
+"""Called with the machine position in mm, some times a second, on the way."""
+
+
+def unheard(_machine_mm: float) -> None:
+    """Tell nobody where the stage is."""
+
+
+class Stage(Protocol):
+    """One motorised axis in its own machine frame (mm).
+
+    Every method raises `StageError` (or one of its kinds) with a sentence, leaves the
+    stage standing, and says in `position_state` what its position is worth after it.
+    """
+
+    @property
+    def position_state(self) -> PositionState:
+        """How far the position can be trusted."""
+        ...
+
+    @property
+    def identity(self) -> StageIdentity:
+        """Who answers, with all settings; after `connect`."""
+        ...
+
+    @property
+    def limits(self) -> StageLimits:
+        """What the controller is set to; after `connect`."""
+        ...
+
+    def connect(self) -> None:
+        """Open the port, find out who answers and refuse what does not fit."""
+        ...
+
+    def home(self) -> None:
+        """Find the reference of the axis; afterwards the position is ``homed``."""
+        ...
+
+    def assume_homed(self, machine_mm: float) -> None:
+        """Take the operator's word that the controller's position is right."""
+        ...
+
+    def move_to(
+        self, machine_mm: float, *, feed_mm_min: float, moved: Moved = unheard
+    ) -> None:
+        """Go to a machine position and return when the stage stands there."""
+        ...
+
+    def status(self) -> StageStatus:
+        """Ask the controller; a silent controller is a status, not an error."""
+        ...
+
+    def listen(self) -> None:
+        """Take in what the controller says unasked; raise if it lost its position."""
+        ...
+
+    def stop_requested(self) -> bool:
+        """Return whether another process asks this one to stop the stage."""
+        ...
+
+    def request_stop(self) -> None:
+        """Ask the thread that moves the stage to hold; safe from any thread."""
+        ...
+
+    def hold(self) -> None:
+        """Slow down, stand, forget the rest of the move; the position stays good."""
+        ...
+
+    def stop(self) -> None:
+        """Stop at once; the position is ``unverified`` if anything was moving."""
+        ...
+
+    def recover(self) -> None:
+        """Bring the controller back after an alarm, a timeout or a lost link."""
+        ...
+
+    def unlock(self) -> None:
+        """Lift the alarm lock without homing; the position is not ``homed`` then."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the port."""
+        ...

@@ -1,0 +1,296 @@
+"""What the stages on a serial port share, whatever dialect their board speaks.
+
+Port and owner's note, limits, stop requests, and motion in short pieces: boards have no
+watchdog, so a stage whose host dies runs on for one piece at most.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from typing import Generic, TypeVar
+
+from ...core.errors import StageError
+from ..clock import Clock
+from ..interrupts import StopAtOnce
+from ..link import Link, WireLog
+from ..ports import resolve_port
+from .config import StageConfig
+from .presence import Presence
+from .protocol import (
+    InterlockError,
+    Moved,
+    PositionLostError,
+    PositionState,
+    StageIdentity,
+    StageLimits,
+    StoppedError,
+    unheard,
+)
+from .trust import Counting, PositionTrust
+
+logger = logging.getLogger(__name__)
+
+MARGIN_S = 5.0
+STOPPED = "the stage was stopped by magbend rig stop, a key or Ctrl-C"
+
+Session = TypeVar("Session", bound=Counting)
+
+
+class SerialStage(ABC, Generic[Session]):
+    """One axis of a board; a dialect says how to meet, move and stop it.
+
+    Parameters
+    ----------
+    config : StageConfig
+        Table ``[stage]`` of the rig file.
+    clock : Clock
+        Time.
+    log : WireLog, optional
+        Where every byte is recorded.
+    """
+
+    def __init__(
+        self, config: StageConfig, clock: Clock, *, log: WireLog | None = None
+    ) -> None:
+        self._config = config
+        self._clock = clock
+        self._log = log
+        self._link: Link | None = None
+        self._session: Session | None = None
+        self._presence: Presence | None = None
+        self._identity: StageIdentity | None = None
+        self._limits: StageLimits | None = None
+        self._trust = PositionTrust()
+
+    @property
+    def position_state(self) -> PositionState:
+        """How far the position can be trusted."""
+        return self._trust.state
+
+    @property
+    def identity(self) -> StageIdentity:
+        """Who answers, with all settings."""
+        if self._identity is None:
+            raise StageError("the stage is not connected")
+        return self._identity
+
+    @property
+    def limits(self) -> StageLimits:
+        """What the board is set to."""
+        if self._limits is None:
+            raise StageError("the stage is not connected")
+        return self._limits
+
+    # --- what a dialect says --------------------------------------------------
+
+    @abstractmethod
+    def _meet(self, link: Link) -> Session:
+        """Identify and audit the board; note its identity, limits and trust."""
+
+    @abstractmethod
+    def _standing_mm(self) -> float:
+        """Return where the board counts itself, standing.
+
+        Raises
+        ------
+        StageError
+            If it moves, or does not say where it is.
+        """
+
+    @abstractmethod
+    def _ready_mm(self) -> float:
+        """Bring the board to where it takes a motion; return where it stands.
+
+        Raises
+        ------
+        StageError
+            If it may not move: it moves already, is locked, or is not homed.
+        """
+
+    @abstractmethod
+    def _move_piece(self, target_mm: float, feed_mm_min: float, moved: Moved) -> None:
+        """Go there, a short way, and return when the stage stands there."""
+
+    @abstractmethod
+    def listen(self) -> None:
+        """Take in what the board says unasked; raise if it lost its position."""
+
+    @abstractmethod
+    def hold(self) -> None:
+        """Bring to a stand what moves, and forget the rest; the position stays good."""
+
+    @abstractmethod
+    def stop(self) -> None:
+        """Stop at once; what was moving has lost steps."""
+
+    @abstractmethod
+    def _cry_stop(self) -> None:
+        """Send what stops the board at once, and wait for nothing."""
+
+    # --- port -----------------------------------------------------------------
+
+    def connect(self) -> None:
+        """Open the port, find out who answers, refuse what does not fit.
+
+        Raises
+        ------
+        StageError
+            If the port cannot be opened, nobody answers in this dialect, or a setting
+            does not fit the rig file: the sentence names the setting.
+        """
+        config = self._config
+        self._let_go()
+        self._trust.lose()
+        port = resolve_port(config.port)
+        link = Link(
+            port, baud=config.baud, clock=self._clock, log=self._log, dtr=config.dtr
+        )
+        link.open()
+        self._link, self._presence = link, Presence(port)
+        self._presence.claim()
+        try:
+            self._session = self._meet(link)
+        except BaseException:
+            self._let_go()
+            raise
+
+    def close(self) -> None:
+        """Let go of the port."""
+        self._let_go()
+
+    def _let_go(self) -> None:
+        if self._link:
+            self._link.close()
+        if self._presence:
+            self._presence.release()
+        self._link = self._session = self._presence = None
+
+    def _require_session(self) -> Session:
+        if self._session is None:
+            raise StageError("the stage is not connected")
+        return self._session
+
+    def _require_link(self) -> Link:
+        if self._link is None:
+            raise StageError("the stage is not connected")
+        return self._link
+
+    # --- stop requests --------------------------------------------------------
+
+    def stop_requested(self) -> bool:
+        """Return whether another process asks this one to stop the stage."""
+        return self._presence is not None and self._presence.stop_asked()
+
+    def request_stop(self) -> None:
+        """Ask the thread that moves the stage to hold; safe from any thread."""
+        if self._presence is not None:
+            self._presence.ask_to_stop()
+
+    def _stop_is_met(self) -> None:
+        if self._presence is not None:
+            self._presence.clear_stop()
+
+    def _hold_if_asked(self) -> None:
+        if self.stop_requested():
+            self.hold()
+            raise StoppedError(STOPPED)
+
+    @contextlib.contextmanager
+    def _stand_if_interrupted(self, *, at_once: bool = False) -> Iterator[None]:
+        """On Ctrl-C hold first, so that the position stays; a second one stops.
+
+        `at_once` is for homing, which has no position to keep.
+        """
+        try:
+            yield
+        except KeyboardInterrupt as interrupt:
+            at_once = at_once or isinstance(interrupt, StopAtOnce)
+            try:
+                self.stop() if at_once else self.hold()
+            except KeyboardInterrupt:
+                with contextlib.suppress(StageError):
+                    self._cry_stop()
+                self._trust.doubt()
+            except StageError as error:
+                logger.warning("stage: %s", error)
+            raise
+
+    # --- position and motion --------------------------------------------------
+
+    def assume_homed(self, machine_mm: float) -> None:
+        """Take the operator's word that the board's count is right.
+
+        Raises
+        ------
+        StageError
+            If the stage does not stand, counts otherwise, or has switches and was not
+            homed by them.
+        """
+        here = self._standing_mm()
+        if abs(here - machine_mm) > self.limits.tolerance_mm:
+            raise StageError(
+                f"the board counts {here:.3f} mm, not {machine_mm:.3f} mm: it moved"
+            )
+        if self._config.homing == "switches" and self._trust.state != "homed":
+            raise PositionLostError(
+                f"the position of the stage is {self._trust.state}; it has switches: "
+                "home it first (magbend rig home)"
+            )
+        self._trust.confirm(self._require_session())
+
+    def _require_switches(self) -> None:
+        if self._config.homing != "switches":
+            raise StageError(
+                'the rig file says homing = "manual": bring the stage to a known gap '
+                "and say which: magbend rig set-gap GAP"
+            )
+
+    def move_to(
+        self, machine_mm: float, *, feed_mm_min: float, moved: Moved = unheard
+    ) -> None:
+        """Go there in pieces and return when the stage stands there.
+
+        Raises
+        ------
+        PositionLostError
+            If the stage is not homed, or the board restarted.
+        InterlockError
+            If the target lies outside the travel; nothing was sent.
+        AlarmError, StageTimeoutError, LinkLostError, StoppedError
+            As they say; the stage stands, or finishes one short piece.
+        """
+        self._require_session()
+        self._check_travel(machine_mm)
+        here = self._ready_mm()
+        distance = machine_mm - here
+        if abs(distance) <= self.limits.step_mm / 2.0:
+            return
+        pieces = math.ceil(abs(distance) / self._longest_piece_mm(feed_mm_min))
+        with self._stand_if_interrupted():
+            for piece in range(1, pieces + 1):
+                self._hold_if_asked()
+                target = here + distance * piece / pieces
+                self._move_piece(target, feed_mm_min, moved)
+
+    def _longest_piece_mm(self, feed_mm_min: float) -> float:
+        """Return how far one motion may go, in mm."""
+        del feed_mm_min
+        return self._config.piece_mm
+
+    def _check_travel(self, machine_mm: float) -> None:
+        travel = self.limits.travel_mm
+        slack = self.limits.step_mm / 2.0
+        if travel and not travel[0] - slack <= machine_mm <= travel[1] + slack:
+            raise InterlockError(
+                f"machine position must be from {travel[0]:g} to {travel[1]:g} mm; "
+                f"instead received {machine_mm:g} mm; nothing was sent"
+            )
+
+    def _limit_s(self, distance_mm: float, feed_mm_min: float) -> float:
+        """Return how long a motion may take, on a board that is busy, in s."""
+        usual_s = self.limits.duration_s(distance_mm, feed_mm_min)
+        return MARGIN_S + self._config.busy_factor * usual_s

@@ -1,0 +1,104 @@
+"""Carry out a checked line of G-code on the twin board: motions, dwells, offsets."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator
+from typing import TYPE_CHECKING
+
+from .gcode import GcodeError, Modal, Order
+from .motion import outside, plan, set_offset, target_of
+from .realtime import realtime
+
+if TYPE_CHECKING:
+    from .firmware import GrblBoard
+
+Task = Generator[float, None, None]
+_TICK_S = 0.005
+
+
+def auto_start(board: GrblBoard) -> None:
+    """Start what is queued, if the board is idle."""
+    if board.mover.blocks and board.state == "Idle":
+        board.flags.add("start")
+
+
+def _wait_until_done(board: GrblBoard) -> Task:
+    auto_start(board)
+    while True:
+        yield from realtime(board)
+        if board.aborted or not (board.mover.blocks or board.state == "Run"):
+            return
+        yield math.inf if not board.flags else board.now_s
+
+
+def run_order(board: GrblBoard, order: Order, *, jog: bool = False) -> Task:
+    """Carry out one checked line."""
+    if not jog:
+        if order.modal.system != board.modal.system:
+            board.counters.offset = 0
+        board.modal = order.modal
+    if order.kind == "dwell" and board.state != "Check":
+        yield from _wait_until_done(board)
+        if not board.aborted:
+            yield from _dwell(board, order.seconds)
+    elif order.kind in ("G92", "G92.1", "G10"):
+        yield from _wait_until_done(board)
+        set_offset(board, order)
+    elif order.kind in ("G28.1", "G30.1"):
+        board.eeprom.offsets[order.kind[:3]] = board.planned_mm()
+    elif order.kind in ("G28", "G30"):
+        target = list(board.eeprom.offsets[order.kind])
+        yield from _line(board, target, order)
+    elif order.kind == "move":
+        target = target_of(board, order)
+        if jog and board.eeprom.flag(20) and outside(board, target):
+            raise GcodeError(15)
+        yield from _line(board, target, order, jog=jog)
+    elif order.kind == "end":
+        board.modal = Modal(units=board.modal.units, tool=board.modal.tool)
+        yield from board.print_line("[MSG:Pgm End]")
+
+
+def _dwell(board: GrblBoard, duration_s: float) -> Task:
+    end_s = board.now_s + duration_s
+    while board.now_s < end_s and not board.aborted:
+        yield min(end_s, board.now_s + 0.05)
+        yield from realtime(board)
+
+
+def _line(
+    board: GrblBoard, target: list[float], order: Order, *, jog: bool = False
+) -> Task:
+    if not jog and board.eeprom.flag(20) and outside(board, target):
+        yield from _soft_limit_alarm(board)
+        return
+    if board.state == "Check":
+        return
+    while True:
+        yield from realtime(board)
+        if board.aborted:
+            return
+        if board.mover.free_blocks > 0:
+            break
+        auto_start(board)
+        yield board.now_s + _TICK_S
+    feed = math.inf if order.rapid else order.feed_mm_min
+    plan(board, target, feed * board.overrides[0] / 100.0)
+    if jog and board.state == "Idle" and board.mover.blocks:
+        board.state = "Jog"
+        board.mover.start(board.now_s)
+
+
+def _soft_limit_alarm(board: GrblBoard) -> Task:
+    board.soft_limit = True
+    if board.state == "Run":
+        board.flags.add("hold")
+        while board.state != "Idle":
+            yield from realtime(board)
+            if board.aborted:
+                return
+            yield math.inf if not board.flags else board.now_s
+    board.reset_from_anywhere()
+    board.alarm = 2
+    yield from realtime(board)
