@@ -8,11 +8,11 @@ from pathlib import Path
 from ..core.errors import StoreError
 from ..rig.bench.config import read_plan
 from ..rig.bench.template import write_templates
-from .compare import compare_run, write_comparison
-from .fit import try_fit
-from .load import load_run
+from .compare.compare import compare_run, write_comparison
+from .fit.search import try_fit
 from .report import write_report
-from .twin_run import calibrate_twin, measure_twin, run_on_twin
+from .runs.load import load_run
+from .twin.run import calibrate_twin, measure_twin, run_on_twin
 from .warm_up import is_warm, warm_up
 
 Tell = Callable[[str], None]

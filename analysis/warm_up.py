@@ -52,7 +52,7 @@ def _photograph() -> None:
     from ..vision import as_photo, extract
     from ..vision.measurement import Pose
     from ..vision.synthetic.scene import Block, Scene, render_scene, scene_camera
-    from . import metrics
+    from .compare import metrics
 
     s = np.linspace(0.0, 30.0, 121)
     arc = Centreline(

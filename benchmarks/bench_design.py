@@ -10,9 +10,15 @@ import time
 
 import numpy as np
 
-from magbend.analysis import goals
-from magbend.analysis.design import design
-from magbend.analysis.makeable import Candidates, Makeable, designs_in, dimension, rods
+from magbend.analysis.design import goals
+from magbend.analysis.design.makeable import (
+    Candidates,
+    Makeable,
+    designs_in,
+    dimension,
+    rods,
+)
+from magbend.analysis.design.search import design
 from magbend.core.errors import SolverError
 from magbend.sim import UniformField
 from magbend.sim.batch.shapes import solve_shapes

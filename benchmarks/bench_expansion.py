@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 
-from magbend.analysis.expansion_train import PUBLISHED_MSE_PER_MM2, train
+from magbend.analysis.expansion.train import PUBLISHED_MSE_PER_MM2, train
 
 
 def main(seeds: int) -> None:

@@ -13,8 +13,8 @@ import numpy as np
 
 from magbend import sim
 from magbend.analysis import fit_runs, load_run
-from magbend.analysis.twin import hide
-from magbend.analysis.twin_run import bench_run
+from magbend.analysis.twin.bench import hide
+from magbend.analysis.twin.run import bench_run
 
 FIRST_SEED = 1000
 

@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 from bench_scenes import inside, random_camera, random_scene
 
-from magbend.analysis.twin import TwinBench
+from magbend.analysis.twin.bench import TwinBench
 from magbend.core.magnet import Magnet
 from magbend.sim import gmc
 from magbend.vision import Calibration, Measurement, Pose, as_photo, extract

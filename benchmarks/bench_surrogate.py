@@ -9,9 +9,9 @@ import sys
 
 import numpy as np
 
-from magbend.analysis import surrogate
-from magbend.analysis.surrogate_compare import compare
-from magbend.analysis.surrogate_fit import deviations, draw
+from magbend.analysis.surrogate import model as surrogate
+from magbend.analysis.surrogate.compare import compare
+from magbend.analysis.surrogate.fit import deviations, draw
 
 
 def main(designs: int) -> None:

@@ -24,7 +24,9 @@ def train(
     as_json: bool = JSON,
 ) -> None:
     """Train the paper's expansion model, and say honestly how far it reaches."""
-    from ..analysis import expansion, expansion_train, model_figures
+    from ..analysis.expansion import model as expansion
+    from ..analysis.expansion import train as expansion_train
+    from ..analysis.surrogate import figures as model_figures
     from ..core.files import output_file
 
     if figure is not None:
@@ -85,13 +87,13 @@ def predict(
     as_json: bool = JSON,
 ) -> None:
     """Predict a of y = a x^2 with the trained network; warn outside its domain."""
-    from ..analysis import expansion
+    from ..analysis.expansion import model as expansion
     from ..core.errors import InputError
 
     if gmc is not None and (E_MPa or lengths_mm or side_mm):
         raise InputError("give either --gmc or --E-MPa, --lengths-mm and --side-mm")
     if gmc is not None:
-        from ..analysis.expansion_data import inputs_of
+        from ..analysis.expansion.data import inputs_of
         from ..sim import gmc as rod
 
         inputs = inputs_of(rod(gmc, remeasured=True), flux_mT)

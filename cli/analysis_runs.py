@@ -15,8 +15,8 @@ from .analysis_show import print_comparison, print_fit
 from .console import JSON, print_json, progress
 
 if TYPE_CHECKING:
-    from ..analysis.compare import RunComparison
-    from ..analysis.load import RunData
+    from ..analysis.compare.compare import RunComparison
+    from ..analysis.runs.load import RunData
     from ..sim import Support
 
 _RUNS = typer.Argument(..., help="Run folders, or folders of runs.")
@@ -56,7 +56,7 @@ def compare(
     json: bool = JSON,
 ) -> None:
     """Compare measured with simulated centrelines; write comparison.csv."""
-    from ..analysis.compare import check_any, comparison_table, write_comparison
+    from ..analysis.compare.compare import check_any, comparison_table, write_comparison
 
     _choice(model, ("rod", "solid"), "--model")
     loaded, left_out = _loaded(runs)
@@ -121,10 +121,10 @@ def fit(
     json: bool = JSON,
 ) -> None:
     """Fit the moduli with uncertainties; write fit.json."""
-    from ..analysis.fit import fit_runs, write_fit
-    from ..analysis.fit_problem import common_support
-    from ..analysis.posterior import check_installed, sample_posterior
-    from ..analysis.probe import from_probe_reading
+    from ..analysis.fit.posterior import check_installed, sample_posterior
+    from ..analysis.fit.problem import common_support
+    from ..analysis.fit.search import fit_runs, write_fit
+    from ..analysis.paper.probe import from_probe_reading
     from ..sim import Support
 
     _choice(field, ("magnet", "uniform"), "--field")
@@ -178,8 +178,8 @@ def report(
     json: bool = JSON,
 ) -> None:
     """Write one self-contained HTML page, with the figures as PDF beside it."""
-    from ..analysis.compare import write_comparison
-    from ..analysis.fit import try_fit
+    from ..analysis.compare.compare import write_comparison
+    from ..analysis.fit.search import try_fit
     from ..analysis.report import write_report
     from ..analysis.report.figures import gmc_numbers
 
@@ -235,7 +235,7 @@ def export(
     ),
 ) -> None:
     """Export points, steps and comparisons as CSV, Parquet or MATLAB .mat."""
-    from ..analysis.export import check_export, export_runs
+    from ..analysis.compare.export import check_export, export_runs
 
     loaded, left_out = _loaded(runs)
     check_export(out)
@@ -254,7 +254,7 @@ def paper(
     json: bool = JSON,
 ) -> None:
     """Run the paper's seven GMCs at three fields on the twin bench, and report."""
-    from ..analysis.paper import reproduce
+    from ..analysis.paper.paper import reproduce
 
     with progress("paper") as tell:
         result = reproduce(out, seed=seed, workers=workers, progress=tell)
@@ -270,7 +270,7 @@ def audit(
     json: bool = JSON,
 ) -> None:
     """Check the paper's own numbers; one verdict each, computed here."""
-    from ..analysis.audit import audit_paper, write_audit
+    from ..analysis.paper.audit import audit_paper, write_audit
 
     if out is not None:
         _outputs(out)
@@ -298,7 +298,11 @@ def probe(
     json: bool = JSON,
 ) -> None:
     """Turn readings of a surface probe into remanences, by the stand-off."""
-    from ..analysis.probe import fit_standoff, read_probe_csv, remanence_from_probe_mT
+    from ..analysis.paper.probe import (
+        fit_standoff,
+        read_probe_csv,
+        remanence_from_probe_mT,
+    )
 
     if (reading_mT is None) != (side_mm is None):
         raise InputError("give --reading-mT and --side-mm together, or neither")
@@ -324,7 +328,7 @@ def probe(
 
 def _loaded(paths: Sequence[Path]) -> tuple[list[RunData], list[str]]:
     """Return the runs that can be read, and a sentence on each that cannot."""
-    from ..analysis.load import load_runs
+    from ..analysis.runs.load import load_runs
 
     loaded, left_out = load_runs(paths)
     for run in loaded:
@@ -342,7 +346,7 @@ def _compared(
     load_factor: float = 1.0,
 ) -> list[RunComparison]:
     """Compare each run; add a sentence to `left_out` on each that cannot be."""
-    from ..analysis.compare import compare_run
+    from ..analysis.compare.compare import compare_run
 
     done, errors = [], []
     with progress("compare") if len(loaded) > 4 else nullcontext(silent) as tell:
@@ -406,7 +410,7 @@ def _nuisance(hold: Sequence[str], prior: Sequence[str]) -> Any:
     """Return the priors with the named ones held or changed."""
     from dataclasses import replace
 
-    from ..analysis.nuisance import NUISANCE_NAMES, Nuisance
+    from ..analysis.fit.nuisance import NUISANCE_NAMES, Nuisance
 
     values = dict.fromkeys(NUISANCE_NAMES if "all" in hold else hold, 0.0)
     for text in prior:

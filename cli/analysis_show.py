@@ -11,7 +11,7 @@ import typer
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ..analysis.fit import FitResult
+    from ..analysis.fit.search import FitResult
 
 
 def print_comparison(table: pd.DataFrame) -> None:

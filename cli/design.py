@@ -10,9 +10,9 @@ import typer
 from .console import JSON, print_json
 
 if TYPE_CHECKING:
-    from ..analysis.design import Design
-    from ..analysis.goals import Goal
-    from ..analysis.makeable import Makeable
+    from ..analysis.design.goals import Goal
+    from ..analysis.design.makeable import Makeable
+    from ..analysis.design.search import Design
     from ..sim import Field
 
 EXAMPLE = "Example: magbend analysis design --radius-mm 100 --field-mT 50 --count 5"
@@ -78,8 +78,8 @@ def design(
     as_json: bool = JSON,
 ) -> None:
     """Find distinct rods that give a wanted shape, ranked by error and tolerance."""
-    from ..analysis import design as designing
-    from ..analysis import model_figures
+    from ..analysis.design import search as designing
+    from ..analysis.surrogate import figures as model_figures
     from ..core.files import output_folder
 
     if figure is not None:
@@ -121,7 +121,7 @@ def _goal(
     calibration: Path | None,
     rod_height_mm: float,
 ) -> Goal:
-    from ..analysis import goals
+    from ..analysis.design import goals
     from ..core.errors import InputError
 
     given = [radius_mm, tip_mm, tip_angle_deg, curve, polyline]
@@ -186,7 +186,7 @@ def _makeable(
 ) -> Makeable:
     from pydantic import ValidationError
 
-    from ..analysis import goals, makeable
+    from ..analysis.design import goals, makeable
     from ..core.errors import InputError
     from ..core.toml import read_toml
 

@@ -103,7 +103,7 @@ def open_bench(
                 ask=ask_flux if asks_flux(plan, readings_mT) else None,
             )  # fmt: skip
         else:
-            from ..analysis.twin_run import open_twin_bench, photograph_board
+            from ..analysis.twin.run import open_twin_bench, photograph_board
 
             bench, devices = open_twin_bench(plan, seed=twin_seed, clock=clock, log=log)
         with contextlib.closing(devices):

@@ -22,7 +22,7 @@ def print_dry_run(plan: Plan, as_json: bool) -> None:
     steps = plan_steps(plan)
     previews: dict[int, Any] = {}
     if plan.rig.magnet is not None:
-        from ..analysis.plan_preview import preview_plan
+        from ..analysis.twin.plan_preview import preview_plan
 
         magnet = plan.rig.magnet.magnet()
         found = preview_plan(
@@ -132,7 +132,7 @@ def print_scan(
     }
     lines = [str(found.path), *(f"no reading at {line}" for line in found.skipped)]
     if plan.rig.magnet is not None and len(found.gaps_mm) >= 2:
-        from ..analysis.field_scan import judge_scan
+        from ..analysis.runs.field_scan import judge_scan
 
         judged = judge_scan(
             found.path, found.gaps_mm, found.flux_mT, found.sd_mT,

@@ -33,7 +33,8 @@ def predict(
     as_json: bool = JSON,
 ) -> None:
     """Predict a shape with its error bar; refuse outside the trust region."""
-    from ..analysis import surrogate, surrogate_tables
+    from ..analysis.surrogate import model as surrogate
+    from ..analysis.surrogate import tables as surrogate_tables
     from ..core.centreline import Centreline
     from ..core.errors import InputError
     from ..core.files import output_file
@@ -89,7 +90,8 @@ def fit(
     as_json: bool = typer.Option(False, "--json", help="Print the model card."),
 ) -> None:
     """Fit the surrogate to solved shapes over its domain."""
-    from ..analysis import surrogate, surrogate_fit
+    from ..analysis.surrogate import fit as surrogate_fit
+    from ..analysis.surrogate import model as surrogate
     from ..core.files import output_file
 
     output_file(out)
@@ -115,7 +117,7 @@ def correct(
     as_json: bool = JSON,
 ) -> None:
     """Learn from finite-element or COMSOL tables what the rod misses."""
-    from ..analysis import surrogate_tables
+    from ..analysis.surrogate import tables as surrogate_tables
     from ..core.files import output_file
 
     cases = surrogate_tables.read_tables(tables)
@@ -147,7 +149,8 @@ def compare(
     """Print one honest table: solver, network, linear formula, surrogate."""
     from dataclasses import asdict
 
-    from ..analysis import surrogate, surrogate_compare
+    from ..analysis.surrogate import compare as surrogate_compare
+    from ..analysis.surrogate import model as surrogate
 
     rows = surrogate_compare.compare(surrogate.load(), designs=designs)
     if as_json:
@@ -173,7 +176,8 @@ def sensitivity(
     as_json: bool = JSON,
 ) -> None:
     """Say which parameter matters where: Sobol indices over the design domain."""
-    from ..analysis import model_figures, sobol
+    from ..analysis.surrogate import figures as model_figures
+    from ..analysis.surrogate import sobol
     from ..core.files import output_file, write_text
 
     if figure is not None:

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-from magbend.analysis.design import Design, design
-from magbend.analysis.goals import radius_goal
-from magbend.analysis.makeable import Makeable
+from magbend.analysis.design.goals import radius_goal
+from magbend.analysis.design.makeable import Makeable
+from magbend.analysis.design.search import Design, design
 from magbend.sim import UniformField, solve
 
 RADIUS_MM, FIELD = 60.0, UniformField(flux_mT=60.0)

@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 from run_the_twin_bench import run
 
 from magbend.analysis import fit_runs, load_run
-from magbend.analysis.fit import FitResult
+from magbend.analysis.fit.search import FitResult
 
 
 def main(folder: Path) -> FitResult:

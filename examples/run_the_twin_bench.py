@@ -13,7 +13,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 from magbend.analysis import compare_run, load_run
-from magbend.analysis.twin_run import bench_run
+from magbend.analysis.twin.run import bench_run
 from magbend.sim import gmc
 
 SEED = 2

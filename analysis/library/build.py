@@ -28,7 +28,7 @@ from ...core.errors import MissingExtraError, StoreError
 from ...core.files import output_folder, write_bytes, write_text
 from ...core.progress import Progress, silent
 from ...sim.batch.shapes import ROWS_PER_CALL, STATUS, Designs, cores, solve_shapes
-from .. import descriptors
+from ..shapes import descriptors
 from .space import Space
 
 Columns = dict[str, NDArray]

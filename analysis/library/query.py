@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ...core.centreline import Centreline
 from ...core.errors import InputError, StoreError
 from ...core.files import write_bytes
-from ..metrics import position_at
+from ..compare.metrics import position_at
 from .build import (
     MANIFEST,
     ROW_GROUP,

@@ -22,7 +22,7 @@ from ...core.errors import ConfigError
 from ...core.specimen_file import MagnetModel
 from ...core.toml import FileModel, read_toml
 from ...sim.batch.shapes import Designs
-from ..feasible import falling_moduli, fitting_lengths
+from ..shapes.feasible import falling_moduli, fitting_lengths
 
 Array = NDArray[np.float64]
 LARGEST_GRID = 10_000_000

@@ -14,11 +14,11 @@ import numpy as np
 from ...core.errors import MagbendError, StoreError
 from ...core.files import write_bytes, write_text
 from ...core.progress import Progress, silent
-from ..budget import BudgetLine, tip_budget
-from ..compare import MODELS, Comparison, RunComparison
-from ..fit import FitResult
-from ..load import Step
+from ..compare.compare import MODELS, Comparison, RunComparison
+from ..fit.search import FitResult
+from ..runs.load import Step
 from . import figures
+from .budget import BudgetLine, tip_budget
 from .photos import photo_settings, photograph_svg
 from .style import to_pdf, to_svg
 

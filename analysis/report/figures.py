@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...sim import magnet_flux_mT
-from ..compare import MODELS, Comparison, RunComparison
-from ..fit import FitResult
-from ..metrics import position_at
+from ..compare.compare import MODELS, Comparison, RunComparison
+from ..compare.metrics import position_at
+from ..fit.search import FitResult
 from .style import (
     BAD,
     FAINT,

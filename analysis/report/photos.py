@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...vision.camera.calibration import specimen_to_px
-from ..compare import Comparison, RunComparison
+from ..compare.compare import Comparison, RunComparison
 
 Array = NDArray[np.float64]
 

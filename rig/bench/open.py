@@ -34,7 +34,7 @@ def open_camera(config: CameraConfig, folder: Path, clock: Clock) -> Camera:
     CameraError
         If it cannot be opened or gives no picture.
     ConfigError
-        If it is the twin's (that one is made by `magbend.analysis.twin`), or a setting
+        If it is the twin's (that one is made by `magbend.analysis.twin.bench`), or a setting
         is asked for that the backend cannot make.
     """
     source = config.source
@@ -44,7 +44,7 @@ def open_camera(config: CameraConfig, folder: Path, clock: Clock) -> Camera:
     if backend == "twin":
         raise ConfigError(
             "camera.backend twin is the computed bench: it needs the twin's devices "
-            "(magbend.analysis.twin)"
+            "(magbend.analysis.twin.bench)"
         )
     if backend != "opencv":
         _refuse_settings(config, backend)
@@ -148,7 +148,7 @@ def open_meter(
     if config.driver == "twin":
         raise ConfigError(
             "meter.driver twin is the computed bench: it needs the twin's devices "
-            "(magbend.analysis.twin)"
+            "(magbend.analysis.twin.bench)"
         )
     from ..meter.description import read_description
     from ..meter.serial import SerialMeter

@@ -12,8 +12,8 @@ from analysis_factory import write_run
 from scipy.io import loadmat
 
 from magbend.analysis import compare_run, fit_runs, load_run
-from magbend.analysis.export import export_runs
-from magbend.analysis.posterior import sample_posterior
+from magbend.analysis.compare.export import export_runs
+from magbend.analysis.fit.posterior import sample_posterior
 from magbend.cli.main import main
 from magbend.core.errors import InputError, MissingExtraError
 

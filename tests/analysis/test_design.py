@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from magbend.analysis import goals
-from magbend.analysis.design import design
-from magbend.analysis.makeable import (
+from magbend.analysis.compare.metrics import fit_circle
+from magbend.analysis.design import goals
+from magbend.analysis.design.makeable import (
     PAPER_RECIPES,
     PAPER_SIDES_MM,
     Candidates,
@@ -20,7 +20,7 @@ from magbend.analysis.makeable import (
     rods,
     scattered,
 )
-from magbend.analysis.metrics import fit_circle
+from magbend.analysis.design.search import design
 from magbend.cli.main import app
 from magbend.core.errors import ConfigError, InputError, SolverError
 from magbend.core.magnet import Magnet

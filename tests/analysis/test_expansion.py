@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from magbend.analysis import expansion
-from magbend.analysis.expansion_data import SPLITS, held_out, inputs_of, training_set
-from magbend.analysis.expansion_train import train
+from magbend.analysis.expansion import model as expansion
+from magbend.analysis.expansion.data import SPLITS, held_out, inputs_of, training_set
+from magbend.analysis.expansion.train import train
 from magbend.cli.main import app
 from magbend.core.errors import InputError, MissingExtraError, StoreError
 from magbend.sim import gmc

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from magbend.analysis.field_check import check_against_magnet, check_readings
-from magbend.analysis.field_scan import judge_scan
-from magbend.analysis.plan_preview import preview_plan
+from magbend.analysis.runs.field_check import check_against_magnet, check_readings
+from magbend.analysis.runs.field_scan import judge_scan
+from magbend.analysis.twin.plan_preview import preview_plan
 from magbend.core.errors import InputError
 from magbend.core.magnet import Magnet
 from magbend.core.specimen import Section, Specimen

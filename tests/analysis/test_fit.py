@@ -13,12 +13,12 @@ from analysis_factory import MAGNET, write_run
 
 from magbend import sim
 from magbend.analysis import fit_runs, load_run
-from magbend.analysis.fit import write_fit
-from magbend.analysis.fit_problem import build_problem
-from magbend.analysis.fit_residuals import residuals
-from magbend.analysis.nuisance import Nuisance
-from magbend.analysis.twin import hide
-from magbend.analysis.twin_run import bench_run
+from magbend.analysis.fit.nuisance import Nuisance
+from magbend.analysis.fit.problem import build_problem
+from magbend.analysis.fit.residuals import residuals
+from magbend.analysis.fit.search import write_fit
+from magbend.analysis.twin.bench import hide
+from magbend.analysis.twin.run import bench_run
 from magbend.core.errors import InputError, SolverError, StoreError
 from magbend.core.specimen import Specimen
 

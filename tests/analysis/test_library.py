@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from magbend.analysis.feasible import falling_moduli, fitting_lengths
+from magbend.analysis.compare.metrics import circularity, fit_circle, quadratic_fit
 from magbend.analysis.library.build import (
     build,
     partition_count,
@@ -25,7 +25,7 @@ from magbend.analysis.library.build import (
 )
 from magbend.analysis.library.query import query, write_rows
 from magbend.analysis.library.space import Space, read_space
-from magbend.analysis.metrics import circularity, fit_circle, quadratic_fit
+from magbend.analysis.shapes.feasible import falling_moduli, fitting_lengths
 from magbend.cli.main import app
 from magbend.core.errors import ConfigError, InputError, StoreError
 from magbend.core.specimen import Section, Specimen

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from magbend.analysis import metrics
+from magbend.analysis.compare import metrics
 from magbend.core.centreline import Centreline
 from magbend.core.errors import InputError
 

@@ -12,9 +12,9 @@ from analysis_factory import write_run
 
 from magbend import sim
 from magbend.analysis import compare_run, load_run
-from magbend.analysis.audit import audit_paper, end_face_share, write_audit
-from magbend.analysis.paper import gmc_numbers, reproduce
-from magbend.analysis.probe import (
+from magbend.analysis.paper.audit import audit_paper, end_face_share, write_audit
+from magbend.analysis.paper.paper import gmc_numbers, reproduce
+from magbend.analysis.paper.probe import (
     fit_standoff,
     from_probe_reading,
     probe_factor,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from magbend.analysis.sobol import OUTPUTS, PARAMETERS, sensitivity
+from magbend.analysis.surrogate.sobol import OUTPUTS, PARAMETERS, sensitivity
 from magbend.core.errors import InputError
 
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from magbend.analysis import surrogate
-from magbend.analysis.surrogate_compare import compare, linear_a_per_mm
-from magbend.analysis.surrogate_fit import deviations, draw, fit
-from magbend.analysis.surrogate_tables import (
+from magbend.analysis.surrogate import model as surrogate
+from magbend.analysis.surrogate.compare import compare, linear_a_per_mm
+from magbend.analysis.surrogate.fit import deviations, draw, fit
+from magbend.analysis.surrogate.tables import (
     corrected,
     fit_correction,
     load_correction,

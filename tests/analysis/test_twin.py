@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from magbend.analysis.twin import HiddenTruth, TwinBench, hide
+from magbend.analysis.twin.bench import HiddenTruth, TwinBench, hide
 from magbend.core.magnet import Magnet
 from magbend.sim import gmc
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from magbend import sim
-from magbend.analysis.metrics import fit_circle
-from magbend.analysis.twin import hide
+from magbend.analysis.compare.metrics import fit_circle
+from magbend.analysis.twin.bench import hide
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 

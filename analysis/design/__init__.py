@@ -1,0 +1,1 @@
+"""Designs that give a wanted shape."""

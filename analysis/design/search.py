@@ -1,0 +1,366 @@
+"""Design backwards: from a wanted shape to several rods that can be made and give it.
+
+Sobol points over what can be made are solved together; the nearest, spread apart, start
+a Levenberg-Marquardt search in the unit cube (all of them in one batch, derivatives by
+forward differences, coordinates held at the walls they press on). Of what hits the
+goal the designs least sensitive to fabrication scatter are taken, each apart from the
+others, and each solved again by itself, with the digits that are printed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.checks import within
+from ...core.errors import SolverError
+from ...core.specimen import Specimen
+from ...core.specimen_file import specimen_dict
+from ...sim import Field, solve
+from ...sim.batch.shapes import solve_shapes
+from ..library.space import sobol_points
+from . import goals
+from .goals import Goal
+from .makeable import (
+    Candidates,
+    Makeable,
+    binding,
+    choices,
+    designs_in,
+    dimension,
+    rods,
+    scattered,
+    specimen_of,
+)  # fmt: skip
+
+Array = NDArray[np.float64]
+
+STARTS = 2048
+POLISHED = 96
+STEPS = 12
+APART, NEAREST_APART = 1.0, 0.3
+"""Distance of distinct designs, in units of 3 mm of a unit length, a third of a modulus
+or a tenth of the side (`_features`); the second where there are no such."""
+SAMPLES = 256
+_DIFFERENCE = 1e-4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Design:
+    """A rod that gives the wanted shape.
+
+    Parameters
+    ----------
+    specimen : Specimen
+    achieved : float
+        By a direct solve of this specimen: radius in mm, tip angle in degrees, or the
+        distance in mm from a wanted tip or curve.
+    error : float
+        Percent of a wanted radius or angle; mm for a tip or curve.
+    tolerance : float
+        Half of the interval that holds 95 % of the rods that fabrication scatter makes
+        of it, in the unit of `achieved`; for a tip or curve the distance that 95 % of
+        them stay within.
+    tip_mm, tip_angle_deg, radius_mm : tuple and floats
+        Of the direct solve.
+    tip_tolerance_mm : float
+        Distance from `tip_mm` that 95 % of the scattered rods stay within.
+    shape_mm : ndarray, shape (61, 2)
+    band_mm : ndarray, shape (samples, 61, 2)
+        Shapes under fabrication scatter.
+    """
+
+    specimen: Specimen
+    achieved: float
+    error: float
+    tolerance: float
+    tip_mm: tuple[float, float]
+    tip_angle_deg: float
+    radius_mm: float
+    tip_tolerance_mm: float
+    shape_mm: Array
+    band_mm: Array
+
+
+def design(
+    goal: Goal, field: Field, makeable: Makeable, *, count: int = 5, seed: int = 0
+) -> list[Design]:
+    """Return up to `count` distinct designs that meet a goal, best first.
+
+    Designs are ranked by error where it matters (in steps of a tenth of what counts as
+    a hit), then by tolerance.
+
+    Parameters
+    ----------
+    goal : Goal
+    field : UniformField or MagnetField
+    makeable : Makeable
+    count : int
+    seed : int
+        Of the Sobol points and of the scatter.
+
+    Raises
+    ------
+    SolverError
+        If no design meets the goal: how near one comes, and which limits bind.
+    """
+    count = int(within(count, 1, 100, "count", ""))
+    found, norms = _search(goal, field, makeable, seed)
+    table = rods(makeable, found)
+    limit = goals.hit_limit(goal)
+    rng = np.random.default_rng(seed)
+    best = int(np.argmin(norms))
+    first = _verified(goal, field, specimen_of(table, best, "design"), makeable, rng)
+    if first is None or first.error > limit:
+        raise SolverError(_unreachable(goal, field, makeable, table, best, first))
+    good = np.flatnonzero(norms <= max(2.0 * norms[best], 0.2 * _relative(goal, limit)))
+    spread = _spread(goal, field, table, good, makeable)
+    features = _features({name: values[good] for name, values in table.items()})
+    picked = _distinct(features, spread, count)
+    designs = []
+    for i in good[picked]:
+        one = _verified(
+            goal, field, specimen_of(table, int(i), "design"), makeable, rng
+        )
+        if one is not None and one.error <= limit:
+            designs.append(one)
+    designs.sort(key=lambda d: (round(10.0 * d.error / limit), d.tolerance))
+    return [
+        replace(one, specimen=replace(one.specimen, name=f"design {number}"))
+        for number, one in enumerate(designs, start=1)
+    ]
+
+
+def _relative(goal: Goal, limit: float) -> float:
+    """Return what counts as a hit in the units of the residuals."""
+    if goal.kind in ("radius", "angle"):
+        return limit / 100.0
+    length_mm = goals.curve_length_mm(goal)
+    return limit / (length_mm or max(math.hypot(*goal.wanted), 1.0))
+
+
+def _evaluate(
+    goal: Goal, field: Field, makeable: Makeable, candidates: Candidates
+) -> Array:
+    designs = designs_in(rods(makeable, candidates), field)
+    return goals.residuals(goal, solve_shapes(designs).points)
+
+
+def _search(
+    goal: Goal, field: Field, makeable: Makeable, seed: int
+) -> tuple[Candidates, Array]:
+    d = dimension(makeable)
+    u = sobol_points(d + 1, 0, STARTS, seed)
+    kinds = len(choices(makeable))
+    choice = np.minimum((u[:, d] * kinds).astype(np.int64), kinds - 1)
+    starts = Candidates(z=u[:, :d], choice=choice)
+    r = _evaluate(goal, field, makeable, starts)
+    norms = np.linalg.norm(r, axis=1)
+    keep = _spread_out(starts, np.argsort(norms)[: 6 * POLISHED], POLISHED)
+    return _polish(goal, field, makeable, starts.take(keep), r[keep])
+
+
+def _spread_out(candidates: Candidates, order: NDArray, count: int) -> NDArray:
+    """Take the nearest third, then those farthest from what is taken."""
+    taken = list(order[: count // 3])
+    rest = order[count // 3 :]
+    z = np.column_stack([candidates.z, 3.0 * candidates.choice])
+    distance = np.full(len(rest), np.inf)
+    for i in taken:
+        distance = np.minimum(distance, np.linalg.norm(z[rest] - z[i], axis=1))
+    while len(taken) < min(count, len(order)):
+        far = int(np.argmax(distance))
+        taken.append(rest[far])
+        step = np.linalg.norm(z[rest] - z[rest[far]], axis=1)
+        distance = np.minimum(distance, step)
+    return np.array(taken)
+
+
+def _features(rods_: dict[str, Array]) -> Array:
+    """Return coordinates in which distances tell designs apart."""
+    return np.column_stack(
+        [
+            np.log(rods_["E_MPa"]) / 0.3,
+            rods_["length_mm"] / 3.0,
+            np.log(rods_["side_mm"]) / 0.1,
+            np.log(np.abs(rods_["remanence_mT"])) / 0.1,
+        ]
+    )
+
+
+def _polish(
+    goal: Goal, field: Field, makeable: Makeable, at: Candidates, r: Array
+) -> tuple[Candidates, Array]:
+    """Run Levenberg-Marquardt on all candidates together; return them and |r|."""
+    n = len(at.z)
+    z, damping = at.z.copy(), np.full(n, 1e-3)
+    norms = np.linalg.norm(r, axis=1)
+    live = np.arange(n)
+    for _ in range(STEPS):
+        J = _slopes(
+            goal,
+            field,
+            makeable,
+            Candidates(z=z[live], choice=at.choice[live]),
+            r[live],
+        )
+        step = _steps(J, r[live], z[live], damping[live])
+        trial = np.clip(z[live] + step, 0.0, 1.0)
+        new = _evaluate(
+            goal, field, makeable, Candidates(z=trial, choice=at.choice[live])
+        )
+        size = np.linalg.norm(new, axis=1)
+        better = size < norms[live]
+        damping[live] = np.where(better, damping[live] * 0.2, damping[live] * 8.0)
+        won = live[better]
+        z[won], r[won], norms[won] = trial[better], new[better], size[better]
+        live = np.flatnonzero((norms > 1e-6) & (damping < 1e6))
+        if len(live) == 0:
+            break
+    return Candidates(z=z, choice=at.choice), norms
+
+
+def _slopes(
+    goal: Goal, field: Field, makeable: Makeable, at: Candidates, r: Array
+) -> Array:
+    """Return dr/dz, shape (n, m, d), by differences that stay inside the cube."""
+    n, d = at.z.shape
+    step = np.where(at.z < 0.5, _DIFFERENCE, -_DIFFERENCE)
+    moved = np.repeat(at.z[:, None, :], d, axis=1)
+    moved[:, range(d), range(d)] += step
+    many = Candidates(z=moved.reshape(n * d, d), choice=np.repeat(at.choice, d))
+    new = _evaluate(goal, field, makeable, many).reshape(n, d, -1)
+    slopes: Array = ((new - r[:, None, :]) / step[:, :, None]).transpose(0, 2, 1)
+    return slopes
+
+
+def _steps(J: Array, r: Array, z: Array, damping: Array) -> Array:
+    """Return damped steps; coordinates that press on a wall are held."""
+    gradient = np.einsum("nmd,nm->nd", J, r)
+    held = ((z <= 0.0) & (gradient > 0.0)) | ((z >= 1.0) & (gradient < 0.0))
+    J = np.where(held[:, None, :], 0.0, J)
+    square = np.einsum("nmd,nme->nde", J, J)
+    scale = np.einsum("ndd->n", square) + 1e-12
+    d = z.shape[1]
+    square += (damping * scale)[:, None, None] * np.eye(d)
+    right = -np.einsum("nmd,nm->nd", J, r)[:, :, None]
+    step: Array = np.linalg.solve(square, right)[:, :, 0]
+    return step
+
+
+def _spread(
+    goal: Goal, field: Field, table: dict[str, Array], good: NDArray, makeable: Makeable
+) -> Array:
+    """Return how much fabrication scatter moves each goal, to first order."""
+    scatter = makeable.scatter
+    base = {name: values[good] for name, values in table.items()}
+    r0 = goals.residuals(goal, solve_shapes(designs_in(base, field)).points)
+    variance = np.zeros(len(good))
+    share = {"E_MPa": scatter.E_percent, "remanence_mT": scatter.remanence_percent}
+    for name, values in base.items():
+        columns = [...] if values.ndim == 1 else list(range(values.shape[1]))
+        for column in columns:
+            moved = values.copy()
+            at = column if values.ndim == 1 else (slice(None), column)
+            fixed = {"side_mm": scatter.side_mm, "length_mm": scatter.length_mm}
+            sd = fixed.get(name, np.abs(values[at]) * share.get(name, 0.0) / 100.0)
+            moved[at] = values[at] + sd
+            shapes = solve_shapes(designs_in({**base, name: moved}, field)).points
+            change = goals.residuals(goal, shapes) - r0
+            variance += np.sum(change**2, axis=1)
+    return np.sqrt(variance)
+
+
+def _distinct(z: Array, spread: Array, count: int) -> list[int]:
+    """Take the least sensitive designs that are apart from those taken before."""
+    order = np.argsort(spread, kind="stable")
+    apart = APART
+    while True:
+        taken: list[int] = []
+        for i in order:
+            if len(taken) < count and all(
+                np.linalg.norm(z[i] - z[j]) >= apart for j in taken
+            ):
+                taken.append(int(i))
+        if len(taken) == count or apart <= NEAREST_APART:
+            return taken
+        apart = max(0.7 * apart, NEAREST_APART)
+
+
+def _verified(
+    goal: Goal,
+    field: Field,
+    specimen: Specimen,
+    makeable: Makeable,
+    rng: np.random.Generator,
+) -> Design | None:
+    line = solve(specimen, field).centreline
+    if line is None:
+        return None
+    one = goals.shape_points(line)
+    value = float(goals.achieved(goal, one)[0])
+    many = scattered(specimen, makeable.scatter, SAMPLES, rng)
+    shapes = solve_shapes(designs_in(many, field)).points
+    shapes = shapes[np.isfinite(shapes[:, -1, 0])]
+    made = goals.achieved(goal, shapes)
+    away = shapes[:, -1, 1:3] - np.array(line.tip_mm)
+    if goal.kind in ("radius", "angle"):
+        low, high = np.quantile(made, [0.025, 0.975])
+        tolerance = float(high - low) / 2.0
+    else:
+        tolerance = float(np.quantile(made, 0.95))
+    return Design(
+        specimen=specimen,
+        achieved=value,
+        error=goals.error_of(goal, value),
+        tolerance=tolerance,
+        tip_mm=line.tip_mm,
+        tip_angle_deg=line.tip_angle_deg,
+        radius_mm=float(goals.achieved(goals.radius_goal(1.0), one)[0]),
+        tip_tolerance_mm=float(np.quantile(np.hypot(*away.T), 0.95)),
+        shape_mm=line.points_mm,
+        band_mm=shapes[:, :, 1:3],
+    )
+
+
+def as_dict(found: Design, goal: Goal) -> dict[str, object]:
+    """Return a design for machines; ``specimen`` has the keys of a specimen file."""
+    unit = "percent" if goal.kind in ("radius", "angle") else "mm"
+    data: dict[str, object] = {
+        "specimen": specimen_dict(found.specimen),
+        "achieved_radius_mm": found.radius_mm,
+        "achieved_tip_mm": list(found.tip_mm),
+        "achieved_tip_angle_deg": found.tip_angle_deg,
+        f"error_{unit}": found.error,
+        "tolerance_mm": found.tolerance,
+        "tip_tolerance_mm": found.tip_tolerance_mm,
+    }
+    if goal.kind == "angle":
+        data["tolerance_mm"] = found.tip_tolerance_mm
+        data["tolerance_deg"] = found.tolerance
+    return data
+
+
+def _unreachable(
+    goal: Goal,
+    field: Field,
+    makeable: Makeable,
+    table: dict[str, Array],
+    best: int,
+    nearest: Design | None,
+) -> str:
+    limits = ", ".join(binding(makeable, table, best)) or "none of the limits alone"
+    if nearest is None:
+        return f"no rod that can be made gives {goal.words} and stays off the magnet"
+    units = {"radius": "mm", "angle": "deg"}
+    if goal.kind in units:
+        near = f"the nearest is {nearest.achieved:.4g} {units[goal.kind]}"
+    else:
+        near = f"the nearest misses it by {nearest.achieved:.3g} mm"
+    return (
+        f"no rod that can be made gives {goal.words} in this field: {near}, "
+        f"with {limits}"
+    )

@@ -1,0 +1,1 @@
+"""Moduli from runs, and how sure they are."""

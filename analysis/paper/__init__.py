@@ -1,0 +1,1 @@
+"""The source paper: its figures again, and what its numbers say."""

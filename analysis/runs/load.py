@@ -1,0 +1,505 @@
+"""A run and its centrelines, read from the run folder (DESIGN, section 4).
+
+`load_run` gives what the rest of the analysis works on; its properties `steps_table`,
+`frames_table` and `points_table` are tidy pandas tables for notebooks. A run that was
+cut off is read as far as it goes, and says so in `warnings`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from ...core.centreline import Centreline
+from ...core.errors import ConfigError, InputError, StoreError
+from ...core.magnet import Magnet
+from ...core.specimen import Specimen
+from ...core.specimen_file import MagnetModel, SpecimenModel
+from ...rig.bench.config import BenchModel
+from ...rig.runs.read import read_run
+from ...sim import Support
+from ...vision.camera.calibration import Calibration
+from ...vision.measurement import Pose
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+POINT_COLUMNS = (
+    "s_mm", "x_mm", "y_mm", "theta_rad", "kappa_per_mm", "width_mm", "sigma_mm",
+    "x_px", "y_px", "good",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Step:
+    """One finished step of a run; NaN where nothing was read."""
+
+    index: int
+    gap_mm: float
+    flux_mT: float
+    flux_sd_mT: float
+    flux_status: str
+    image: str
+    flags: tuple[str, ...] = ()
+    time_utc: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Frame:
+    """What `magbend vision extract` found in one photograph.
+
+    Attributes
+    ----------
+    image : str
+        Name of the photograph.
+    status, flags, reason
+        ``ok`` or ``failed``, every doubt by name, and why it failed.
+    points : dict of str to ndarray, shape (n,)
+        `POINT_COLUMNS`; empty where it failed.
+    centreline : Centreline or None
+        In mm; None where it failed or has no calibration.
+    sigma_mm : ndarray, shape (n,)
+        Standard deviation across the line at its points, NaN where unknown.
+    width_mm : float
+        Median width.
+    clamp_angle_sd_deg : float
+        Standard deviation of the direction at the clamp, which turns the whole line;
+        NaN where the table does not say.
+    pose : Pose or None
+        Where the specimen frame lies in the board frame.
+    shared_clamp : str
+        The run whose photographs gave the direction together, and share its error;
+        empty where the photograph has its own.
+    """
+
+    image: str
+    status: str
+    flags: tuple[str, ...]
+    reason: str
+    points: dict[str, NDArray[np.float64]]
+    centreline: Centreline | None
+    sigma_mm: NDArray[np.float64]
+    width_mm: float
+    clamp_angle_sd_deg: float
+    pose: Pose | None
+    shared_clamp: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunData:
+    """A run with its centrelines.
+
+    Attributes
+    ----------
+    path : Path
+        The run folder.
+    id, name : str
+        As recorded; the name falls back to the folder's.
+    specimen : Specimen
+        The nominal rod.
+    magnet : Magnet or None
+        The nominal magnet of the rig, if it is recorded.
+    steps : tuple of Step
+        In the order of the run.
+    frames : dict of str to Frame
+        By the name of the photograph.
+    calibration : Calibration or None
+        If ``calibration.json`` is there.
+    record, end : dict
+        ``run.json`` and ``end.json`` (empty if the run was cut off).
+    warnings : tuple of str
+        Sentences on what is missing or doubtful.
+    """
+
+    path: Path
+    id: str
+    name: str
+    specimen: Specimen
+    magnet: Magnet | None
+    steps: tuple[Step, ...]
+    frames: dict[str, Frame]
+    calibration: Calibration | None
+    record: dict[str, Any]
+    end: dict[str, Any]
+    warnings: tuple[str, ...]
+
+    @property
+    def label(self) -> str:
+        """Name of the run folder: what tells runs apart in tables."""
+        return self.path.resolve().name
+
+    @property
+    def support(self) -> Support:
+        """Weight as ``[bench]`` of the rig file tells it; none without a density."""
+        bench = (self.record.get("rig") or {}).get("bench")
+        if not bench:
+            return Support()
+        model = BenchModel.model_validate(bench)
+        return Support(gravity_m_s2=model.gravity_m_s2(self.specimen))
+
+    @property
+    def steps_table(self) -> pd.DataFrame:
+        """One row a step: run, step, gap_mm, flux_mT, ..., frame status."""
+        import pandas as pd
+
+        rows = []
+        for step in self.steps:
+            frame = self.frames.get(step.image)
+            rows.append(
+                {
+                    "run": self.label,
+                    "step": step.index,
+                    "gap_mm": step.gap_mm,
+                    "flux_mT": step.flux_mT,
+                    "flux_sd_mT": step.flux_sd_mT,
+                    "flux_status": step.flux_status,
+                    "image": step.image,
+                    "frame_status": frame.status if frame else "missing",
+                    "time_utc": step.time_utc,
+                }
+            )
+        return pd.DataFrame(rows)
+
+    @property
+    def frames_table(self) -> pd.DataFrame:
+        """One row a photograph: image, status, length_mm, tip, width_mm, ..."""
+        import pandas as pd
+
+        rows = []
+        for frame in self.frames.values():
+            line = frame.centreline
+            rows.append(
+                {
+                    "run": self.label,
+                    "image": frame.image,
+                    "status": frame.status,
+                    "flags": " ".join(frame.flags),
+                    "reason": frame.reason,
+                    "length_mm": line.length_mm if line else math.nan,
+                    "tip_x_mm": line.tip_mm[0] if line else math.nan,
+                    "tip_y_mm": line.tip_mm[1] if line else math.nan,
+                    "tip_angle_deg": line.tip_angle_deg if line else math.nan,
+                    "width_mm": frame.width_mm,
+                }
+            )
+        return pd.DataFrame(rows)
+
+    @property
+    def points_table(self) -> pd.DataFrame:
+        """One row a point: run, step, gap_mm, flux_mT, image, s_mm, x_mm, y_mm, ..."""
+        import pandas as pd
+
+        tables = []
+        for step in self.steps:
+            frame = self.frames.get(step.image)
+            if frame is None or not frame.points:
+                continue
+            table = pd.DataFrame(frame.points)
+            table.insert(0, "image", step.image)
+            table.insert(0, "flux_mT", step.flux_mT)
+            table.insert(0, "gap_mm", step.gap_mm)
+            table.insert(0, "step", step.index)
+            table.insert(0, "run", self.label)
+            tables.append(table)
+        if not tables:
+            names = ("run", "step", "gap_mm", "flux_mT", "image", *POINT_COLUMNS)
+            return pd.DataFrame(columns=list(names))
+        return pd.concat(tables, ignore_index=True)
+
+    def frame(self, step: Step) -> Frame | None:
+        """Return what was found in the photograph of `step`, None if not looked at."""
+        return self.frames.get(step.image)
+
+
+def find_runs(paths: Iterable[Path]) -> list[Path]:
+    """Return the run folders among `paths`, and those directly inside them.
+
+    Raises
+    ------
+    StoreError
+        If a path is missing, is no folder, or holds no run.
+    """
+    runs: list[Path] = []
+    for path in paths:
+        if not path.is_dir():
+            what = "is not a folder" if path.exists() else "there is no such folder"
+            raise StoreError(f"{path}: {what}; give the folder of a run")
+        if (path / "run.json").is_file():
+            runs.append(path)
+            continue
+        inside = sorted(p.parent for p in path.glob("*/run.json"))
+        if not inside:
+            raise StoreError(
+                f"{path}: is not a run folder: it has no run.json; "
+                "magbend rig run makes one"
+            )
+        runs.extend(inside)
+    return list(dict.fromkeys(runs))
+
+
+def load_runs(paths: Iterable[Path]) -> tuple[list[RunData], list[str]]:
+    """Read the runs among `paths`, and those directly inside them.
+
+    Returns
+    -------
+    runs : list of RunData
+        Those that can be read.
+    left_out : list of str
+        A sentence on each of the others.
+
+    Raises
+    ------
+    StoreError
+        If a path holds no run, or none of the runs can be read.
+    """
+    runs, left_out = [], []
+    for path in find_runs(paths):
+        try:
+            runs.append(load_run(path))
+        except StoreError as error:
+            left_out.append(str(error))
+    if not runs:
+        raise StoreError(left_out[0])
+    return runs, left_out
+
+
+def load_run(path: Path | str) -> RunData:
+    """Read a run folder and the centrelines measured from its photographs.
+
+    Parameters
+    ----------
+    path : Path
+        A folder with ``run.json``, ``steps.jsonl``, ``frames.csv`` and
+        ``centrelines.csv``; ``calibration.json`` and ``end.json`` if there are any.
+
+    Raises
+    ------
+    StoreError
+        If a file is missing, torn beyond use or does not hold what it should: one
+        sentence with the command that makes it.
+    """
+    stored = read_run(Path(path))
+    path, record, warnings = stored.path, stored.manifest, list(stored.warnings)
+    try:
+        specimen = SpecimenModel.model_validate(record.get("specimen")).specimen()
+        magnet = _magnet(record)
+        steps = tuple(
+            _step(data) for data in sorted(stored.steps, key=lambda d: int(d["index"]))
+        )
+    except (ValidationError, InputError, KeyError, TypeError, ValueError) as error:
+        raise StoreError(
+            f"{path}: its specimen, magnet or steps cannot be used: "
+            f"{_first_line(error)}"
+        ) from None
+    if not steps:
+        raise StoreError(
+            f"{path}: the run has no finished step; "
+            f"magbend rig run PLAN --out {path} --resume continues it"
+        )
+    end = stored.end or {}
+    if end and not stored.is_finished:
+        warnings.append(f"the run ended with {stored.status}: {end.get('reason', '')}")
+    planned = (record.get("plan") or {}).get("gaps_mm") or []
+    if len(steps) < len(planned):
+        warnings.append(f"{len(planned)} steps were planned, {len(steps)} are finished")
+    frames = _frames(path)
+    for step in steps:
+        if step.image not in frames:
+            warnings.append(f"step {step.index}: {step.image} was never measured")
+    return RunData(
+        path=path,
+        id=str(record.get("id", path.name)),
+        name=stored.name,
+        specimen=specimen,
+        magnet=magnet,
+        steps=steps,
+        frames=frames,
+        calibration=_calibration(path, warnings),
+        record=record,
+        end=end,
+        warnings=tuple(warnings),
+    )
+
+
+def _first_line(error: Exception) -> str:
+    if isinstance(error, ValidationError):
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        return f"{where}: {first['msg']}"
+    return f"the key {error} is missing" if isinstance(error, KeyError) else str(error)
+
+
+def _magnet(record: dict[str, Any]) -> Magnet | None:
+    data = (record.get("rig") or {}).get("magnet")
+    return MagnetModel.model_validate(data).magnet() if data else None
+
+
+def _step(data: dict[str, Any]) -> Step:
+    images = [
+        Path(file["path"]).name
+        for file in data.get("files", [])
+        if str(file["path"]).startswith("images/")
+    ]
+    return Step(
+        index=int(data["index"]),
+        gap_mm=float(data["gap_mm"]),
+        flux_mT=_number(data.get("flux_mT")),
+        flux_sd_mT=_number(data.get("flux_sd_mT")),
+        flux_status=str(data.get("flux_status") or "none"),
+        image=images[0] if images else "",
+        flags=tuple(data.get("flags") or ()),
+        time_utc=str(data.get("time_utc", "")),
+    )
+
+
+def _number(value: Any) -> float:
+    return math.nan if value is None else float(value)
+
+
+def _calibration(path: Path, warnings: list[str]) -> Calibration | None:
+    file = path / "calibration.json"
+    if not file.is_file():
+        warnings.append(
+            "calibration.json is not in the run folder: simulated shapes cannot be "
+            f"drawn on the photographs; copy it to {file}"
+        )
+        return None
+    try:
+        return Calibration.load(file)
+    except ConfigError as error:
+        warnings.append(f"calibration.json cannot be used: {error}")
+        return None
+
+
+def _frames(path: Path) -> dict[str, Frame]:
+    import pandas as pd
+
+    tables = {}
+    for name in ("frames.csv", "centrelines.csv"):
+        file = path / name
+        try:
+            tables[name] = pd.read_csv(file, dtype={"image": str, "flags": str})
+        except FileNotFoundError:
+            raise StoreError(_how_to_measure(path, name)) from None
+        except (ValueError, OSError) as error:
+            raise StoreError(f"{file}: cannot be read as a table: {error}") from None
+    for name, needed in (
+        ("frames.csv", {"image", "status"}),
+        ("centrelines.csv", {"image", *POINT_COLUMNS[:4]}),
+    ):
+        missing = needed - set(tables[name].columns)
+        if missing:
+            raise StoreError(
+                f"{path / name}: must have the column(s) {', '.join(sorted(missing))}; "
+                "magbend vision extract writes such a table"
+            )
+    groups = dict(list(tables["centrelines.csv"].groupby("image", sort=False)))
+    frames = {}
+    for row in tables["frames.csv"].to_dict("records"):
+        frame = _frame(path, row, groups.get(row["image"]))
+        frames[frame.image] = frame
+    return frames
+
+
+def _how_to_measure(path: Path, name: str) -> str:
+    calibrate = ""
+    if not (path / "calibration.json").is_file():
+        calibrate = (
+            f"magbend vision calibrate BOARD.png --out {path / 'calibration.json'}, "
+            "then "
+        )
+    return (
+        f"{path}: {name} is missing, the photographs are not measured yet; run "
+        f"{calibrate}magbend vision extract {path} --calibration "
+        f"{path / 'calibration.json'} --out {path}"
+    )
+
+
+def _frame(path: Path, row: Mapping[Any, Any], table: pd.DataFrame | None) -> Frame:
+    points: dict[str, NDArray[np.float64]] = {}
+    centreline = None
+    status, reason = str(row["status"]), _text(row.get("reason"))
+    if status == "ok" and table is not None:
+        try:
+            points = {
+                name: table[name].to_numpy(dtype=np.float64)
+                for name in POINT_COLUMNS
+                if name in table
+            }
+            centreline = _centreline(points)
+        except (ValueError, InputError) as error:
+            raise StoreError(
+                f"{path / 'centrelines.csv'}: the line of {row['image']} cannot be "
+                f"used: {error}"
+            ) from None
+    elif status == "ok":
+        status, reason = "failed", "centrelines.csv has no line for this photograph"
+    kept = len(centreline.s_mm) if centreline else 0
+    sigma = points.get("sigma_mm")
+    return Frame(
+        image=str(row["image"]),
+        status=status,
+        flags=tuple(_text(row.get("flags")).replace(";", " ").split()),
+        reason=reason,
+        points=points,
+        centreline=centreline,
+        sigma_mm=_good(points, sigma) if sigma is not None else np.full(kept, np.nan),
+        width_mm=_number(row.get("width_mm")),
+        clamp_angle_sd_deg=_number(row.get("clamp_angle_sd_deg")),
+        pose=_pose(row),
+        shared_clamp=_text(row.get("shared_clamp")),
+    )
+
+
+def _centreline(points: dict[str, NDArray[np.float64]]) -> Centreline | None:
+    if not np.any(np.isfinite(points["x_mm"])):
+        return None
+    columns = {
+        name: _good(points, points[name])
+        for name in ("s_mm", "x_mm", "y_mm", "theta_rad")
+    }
+    kappa = points.get("kappa_per_mm")
+    if kappa is None or not np.all(np.isfinite(_good(points, kappa))):
+        columns["kappa_per_mm"] = np.gradient(columns["theta_rad"], columns["s_mm"])
+    else:
+        columns["kappa_per_mm"] = _good(points, kappa)
+    return Centreline(**columns)
+
+
+def _good(
+    points: dict[str, NDArray[np.float64]], values: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the values at measured points; both ends always stay."""
+    good = points.get("good")
+    if good is None:
+        return values
+    keep = good > 0.0
+    keep[[0, -1]] = True
+    return np.asarray(values[keep])
+
+
+def _pose(row: Mapping[Any, Any]) -> Pose | None:
+    values = [
+        _number(row.get(name))
+        for name in ("clamp_x_mm", "clamp_y_mm", "clamp_angle_deg")
+    ]
+    if not all(math.isfinite(value) for value in values):
+        return None
+    height = _number(row.get("rod_height_mm"))
+    return Pose(
+        x_mm=values[0],
+        y_mm=values[1],
+        angle_deg=values[2],
+        height_mm=height if math.isfinite(height) else 0.0,
+    )
+
+
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) else ""

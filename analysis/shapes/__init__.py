@@ -1,0 +1,1 @@
+"""Descriptors of shapes, and which shapes can be."""

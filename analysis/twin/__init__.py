@@ -1,0 +1,1 @@
+"""The virtual bench: rig, simulator and vision in one."""

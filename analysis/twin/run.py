@@ -1,0 +1,148 @@
+"""Runs on the twin bench: open it, carry a plan out, calibrate, measure."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import tempfile
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from ...core.errors import ConfigError, RigError, VisionError
+from ...core.files import write_bytes, write_text
+from ...core.specimen import Specimen
+from ...core.specimen_file import specimen_dict
+from ...rig.bench.config import Plan, read_plan
+from ...rig.bench.devices import Devices, closing_all
+from ...rig.bench.template import write_templates
+from ...rig.clock import Clock, SteppedClock
+from ...rig.link import WireLog
+from ...rig.runs.runner import RunSummary, run
+from ...rig.virtual.bench import open_twin
+from ...vision.batch.run import Settings, extract_files
+from ...vision.camera.calibrate import calibrate
+from ...vision.camera.calibration import Calibration
+from ...vision.picture.photo import read_photo
+from .bench import TwinBench
+
+_SWING = {"swing_mm": 1.0, "swing_Hz": 2.0, "damping_s": 0.4}
+"""How the twin's rod swings after the stage arrived."""
+
+
+def open_twin_bench(
+    plan: Plan, *, seed: int, clock: Clock, log: WireLog | None = None
+) -> tuple[TwinBench, Devices]:
+    """Open the twin bench of a plan: its specimen before its rig's magnet.
+
+    Parameters
+    ----------
+    plan : Plan
+        Its rig file needs the table ``[magnet]``.
+    seed : int
+        Which hidden truth the bench gets.
+    clock : Clock
+        Shared by all devices.
+    log : WireLog, optional
+        Where every byte to and from the board is recorded.
+
+    Raises
+    ------
+    ConfigError
+        If the rig has no magnet.
+    """
+    if plan.rig.magnet is None:
+        raise ConfigError(
+            f"{plan.rig_path}: the twin bench needs a magnet; add the table [magnet] "
+            f"with side_mm and remanence_T"
+        )
+    bench = TwinBench(
+        plan.specimen, plan.rig.magnet.magnet(), seed=seed,
+        gravity_m_s2=plan.gravity_m_s2,
+    )  # fmt: skip
+    devices = open_twin(
+        plan.rig, bench.photograph, bench.flux_mT,
+        seed=seed, clock=clock, log=log, camera=_SWING,
+    )  # fmt: skip
+    return bench, devices
+
+
+def run_on_twin(plan: Plan, folder: Path, *, seed: int) -> tuple[TwinBench, RunSummary]:
+    """Carry a plan out on its twin bench.
+
+    Returns
+    -------
+    bench : TwinBench
+        The bench that was run.
+    summary : RunSummary
+        How the run ended.
+
+    Raises
+    ------
+    RigError
+        If the run did not end with success.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    clock = SteppedClock()
+    with contextlib.closing(WireLog(folder / "wire.log", clock)) as log:
+        bench, devices = open_twin_bench(plan, seed=seed, clock=clock, log=log)
+        with closing_all(devices):
+            summary = run(plan, devices, folder, twin=True)
+    if summary.status != "success":
+        raise RigError(
+            f"{folder}: the run on the twin bench ended with {summary.status}: "
+            f"{summary.reason}"
+        )
+    return bench, summary
+
+
+def photograph_board(bench: TwinBench, path: Path) -> None:
+    """Write the twin camera's picture of the calibration board as PNG."""
+    good, png = cv2.imencode(".png", bench.photograph_board())
+    if not good:
+        raise VisionError(f"{path}: the board's photograph could not be encoded")
+    write_bytes(path, np.asarray(png).tobytes())
+
+
+def calibrate_twin(bench: TwinBench, folder: Path) -> Calibration:
+    """Photograph the twin's board and calibrate the run in `folder` with it."""
+    path = folder / "board.png"
+    photograph_board(bench, path)
+    calibration = calibrate(
+        read_photo(path), board=bench.board, rod_height_mm=bench.axis_height_mm
+    )
+    calibration.save(folder / "calibration.json")
+    return calibration
+
+
+def measure_twin(bench: TwinBench, folder: Path, calibration: Calibration) -> int:
+    """Extract the centrelines of the run in `folder`; return how many there are."""
+    settings = Settings(
+        calibration=calibration,
+        rod_height_mm=bench.axis_height_mm,
+        joints_mm=bench.specimen.joints_mm,
+        length_mm=bench.specimen.length_mm,
+    )
+    return extract_files([folder], folder, settings=settings).measured
+
+
+def bench_run(folder: Path, *, specimen: Specimen, seed: int) -> None:
+    """Run a specimen at the paper's three gaps on the twin bench and measure it.
+
+    Parameters
+    ----------
+    folder : Path
+        The run folder; must not hold a run.
+    specimen : Specimen
+        The nominal rod.
+    seed : int
+        Which hidden truth the bench gets.
+    """
+    with tempfile.TemporaryDirectory() as inputs:
+        write_templates(Path(inputs), twin=True)
+        text = json.dumps(specimen_dict(specimen), indent=1)
+        write_text(Path(inputs) / "specimen.toml", text)
+        plan = read_plan(Path(inputs) / "plan.toml")
+        bench, _ = run_on_twin(plan, folder, seed=seed)
+    measure_twin(bench, folder, calibrate_twin(bench, folder))
