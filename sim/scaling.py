@@ -54,7 +54,7 @@ def stiffness_Nmm2(specimen: Specimen) -> tuple[float, ...]:
 
 @array_cache(maxsize=256)
 def rod_array(specimen: Specimen, support: Support) -> Array:
-    """Return the rod as the kernels take it, tip first (see `planar_march`).
+    """Return the rod as the kernels take it, tip first (see `planar.march`).
 
     Raises
     ------
@@ -117,7 +117,7 @@ def checked_density(specimen: Specimen, support: Support) -> float:
 
 @array_cache(maxsize=1024)
 def field_array(field: Field, length_mm: float) -> Array:
-    """Return the field as the kernels take it (see `planar_march`)."""
+    """Return the field as the kernels take it (see `planar.march`)."""
     out = np.zeros(1 + BLOCK_SIZE)
     if isinstance(field, UniformField):
         angle = rad_from_deg(field.angle_deg)

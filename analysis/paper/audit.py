@@ -275,7 +275,9 @@ def audit_html(findings: Sequence[Finding]) -> str:
 
 def write_audit(out: Path, findings: Sequence[Finding]) -> None:
     """Write the findings as a page of their own, whole or not at all."""
-    css = (Path(__file__).parent / "report" / "report.css").read_text(encoding="utf-8")
+    css = (Path(__file__).parents[1] / "report" / "report.css").read_text(
+        encoding="utf-8"
+    )
     write_text(
         out,
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'

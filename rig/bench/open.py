@@ -34,7 +34,7 @@ def open_camera(config: CameraConfig, folder: Path, clock: Clock) -> Camera:
     CameraError
         If it cannot be opened or gives no picture.
     ConfigError
-        If it is the twin's (that one is made by `magbend.analysis.twin.bench`), or a setting
+        If it is the twin's (`magbend.analysis.twin.bench` makes that one), or a setting
         is asked for that the backend cannot make.
     """
     source = config.source

@@ -3,7 +3,7 @@
 A camera may refuse a setting, take another value, say that it took it and not do so, or
 forget it when the pictures begin to flow. So each setting is asked for, read back at
 once and again after the first picture; the brightness of the photographs has the last
-word (`photo_flags`).
+word (`camera.photo_flags`).
 """
 
 from __future__ import annotations

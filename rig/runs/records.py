@@ -1,6 +1,6 @@
 """What a run writes down, as plain data: step records, files, hashes, times.
 
-The folder is described in DESIGN, section 4; `run_folder` writes it, `read_run` reads
+The folder is described in DESIGN, section 4; `runs.folder` writes it, `runs.read` reads
 it and `verify` checks it. Nothing here touches a device.
 """
 

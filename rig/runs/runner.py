@@ -2,7 +2,7 @@
 
 For each gap of the plan: move from the far side, wait until the rod is still, read the
 Tesla-meter, photograph, check that the stage still stands there, and commit the step
-(see `run_folder`). Whatever happens, the stage is held and ``end.json`` says how the
+(see `runs.folder`). Whatever happens, the stage is held and ``end.json`` says how the
 run ended; if even that cannot be written, its absence says so.
 """
 

@@ -1,6 +1,6 @@
 """A stage in its own machine millimetres: protocol, states and errors.
 
-What people use is the gap in front of the magnet; `gap_stage` maps it onto this.
+What people use is the gap in front of the magnet; `stage.gap` maps it onto this.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Many planar rods side by side: Newton on vectors of rods.
 
-Dimensionless as `planar_march`, for rods of one sign of magnetisation (before a magnet:
+Dimensionless as `planar.march`, for rods of one sign of magnetisation (before a magnet:
 of one load per tesla) and no weight, by Taylor steps of order 8. The unknowns are the
 angle gamma of the tip from its load, as sine and cosine, and the tip's position. A last
 march with steps half as long corrects the result, with the Newton matrix of the march
@@ -265,7 +265,7 @@ def solve_lanes(  # type: ignore[no-untyped-def]
     Parameters
     ----------
     rods : ndarray, shape (n, sections, 5)
-        Tip first (see `planar_march`).
+        Tip first (see `planar.march`).
     length, margin : ndarray, shape (n,)
         Length in mm, and half the side over it: tips nearer to the magnet are `HARD`.
     flux, cosine, sine : ndarray, shape (n,) or, before a magnet, (0,)

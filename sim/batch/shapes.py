@@ -1,7 +1,7 @@
 """Whole shapes of many designs at once: the planar kernels in parallel, on all cores.
 
 Designs are columns of arrays, in mm, MPa, mT and degrees; the kernel is dimensionless
-as `planar_march`. No weight and no clamp angle: this is for searching designs, not for
+as `planar.march`. No weight and no clamp angle: this is for searching designs, not for
 comparing with one bench.
 """
 

@@ -1,7 +1,7 @@
 """Which of many planar rods may run in the lanes, and with how many steps.
 
-A look at the straight rods and the loads on them, before any is solved (`batch_lanes`,
-which says what makes a rod hard). Dimensionless as `planar_march`.
+A look at the straight rods and the loads on them, before any is solved (`batch.lanes`,
+which says what makes a rod hard). Dimensionless as `planar.march`.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def _ready(rod, size, cosine, pull, step):  # type: ignore[no-untyped-def]
     unstable under compression and `pull`, the change of the load across the rod as its
     tip moves across (neither is, by itself, where its product with a compliance is
     below 1; nor both, where the sum is: Dunkerley). What one step takes is that of
-    `planar_march.substeps`, with the most that the moment can come to: between tip and
+    `planar.march.substeps`, with the most that the moment can come to: between tip and
     clamp, e q^2 / 2 = P (cos gamma_L - cos gamma) < P (1 - cos T).
     """
     across = 0.0

@@ -2,7 +2,7 @@
 
 With loops over the orders the compiler sees one rod at a time; written out, it sees one
 loop over the rods and runs it on vectors. That is worth two long functions. The
-recurrences are those of `planar_march.series` and `column_step`, for a load along the
+recurrences are those of `planar.march.series` and `column_step`, for a load along the
 frame's own axis (no weight): s, c, q are sin, cos and moment, g and r a column of theta
 and q, and u and v its products with cos and sin; digits are orders. Fractions are
 multiplied by: a division costs more than all the rest of a term.

@@ -1,11 +1,11 @@
 """`solve_many`: the tips of many designs at once, on all cores.
 
-Designs run in lanes (`batch_lanes`), and those that leave the lanes through the scalar
+Designs run in lanes (`batch.lanes`), and those that leave the lanes through the scalar
 solver, in chunks that a pool of threads takes one by one. Threads rather than numba's
 parallel layer: its fallback aborts when two callers meet and does not survive a fork,
 while kernels that release the interpreter run on all cores, let progress be told and a
 stop be asked between chunks, and load from the cache like any other. For whole shapes
-instead of tips see `batch_shapes.solve_shapes`.
+instead of tips see `batch.shapes.solve_shapes`.
 """
 
 from __future__ import annotations
@@ -231,7 +231,7 @@ def _solve_chunk(
 
 
 def _rods(columns: dict[str, Array]) -> tuple[Array, Array, Array]:
-    """Return rods as `planar_march` takes them (n, k, 5), lengths, and margins."""
+    """Return rods as `planar.march` takes them (n, k, 5), lengths, and margins."""
     length = columns["length_mm"]
     rods = np.empty((*length.shape, 5))
     total = np.empty(len(length))

@@ -187,7 +187,7 @@ def find_equilibria(
 def tip_angles(rod: PlanarRod, load: float = 1.0) -> list[tuple[float, int]]:
     """Return (v, turn) of every equilibrium at `load` times the rod's moment.
 
-    `v` is the scan variable (see `equilibria_march.scan`); `turn` the number of whole
+    `v` is the scan variable (see `equilibria.march.scan`); `turn` the number of whole
     turns by which the clamp is met, zero unless sections are magnetised oppositely.
     The straight rod along the pull has v = infinity.
     """

@@ -1,6 +1,6 @@
 """Whether a rod touches the magnet, at stations or between them.
 
-Dimensionless, with fields as of `planar_march`. Of an arc of length h between points at
+Dimensionless, with fields as of `planar.march`. Of an arc of length h between points at
 distances a and b no point is nearer than (a + b - h) / 2. Where that leaves it open,
 points are taken from the arc, by its cubic through ends and tangents, every quarter of
 the margin (half the rod's side, nearer than which it touches).

@@ -1,6 +1,6 @@
 """Newton from a given tip, and load continuation of the planar rod.
 
-Dimensionless as `planar_march`. The equilibrium is followed from no load to full load
+Dimensionless as `planar.march`. The equilibrium is followed from no load to full load
 with tangent predictors; where Newton would have to jump, the step is halved. A branch
 changes its Morse index at single loads only, so a step over which that changes counts
 as a jump until it is too short for one. The load at which no smaller step helps is a

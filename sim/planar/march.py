@@ -17,7 +17,7 @@ and only as a number of its own, not as a difference of angles, does it keep its
 
 A rod is an array (n, 5), tip first: length h, compliance e, magnetic load m per tesla
 and weight per length wx, wy. A field is an array (17,): 0 and (Bx, By), or 1 and the
-magnet's block (`magnet_field.magnet_block`) in lengths of L. The state X, shape (11,),
+magnet's block (`magnet.field.magnet_block`) in lengths of L. The state X, shape (11,),
 holds theta, q, x, y, Px, Py, what acts within a section: e, wx, wy, and the flux
 density at the tip. The columns D, shape (11, 4), hold derivatives of the first nine.
 

@@ -1,6 +1,6 @@
 """The planar rod on which loads of one sign act along one direction.
 
-Dimensionless as `planar_march`. In a uniform field, without weight and with one sign of
+Dimensionless as `planar.march`. In a uniform field, without weight and with one sign of
 magnetisation, gamma (the angle from the load) solves (gamma' / e)' = P sin(gamma) with
 gamma' = 0 at the tip and gamma = T at the clamp. With v = pi - gamma this is
 -(v' / e)' = P sin(v), and sin(v) / v falls on (0, pi): by the theorem of Brezis and

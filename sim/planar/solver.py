@@ -1,15 +1,15 @@
 """Equilibria of the planar rod and their shapes, one rod or many.
 
-Dimensionless as `planar_march`. Two roads lead to the equilibrium that a rod reaches
+Dimensionless as `planar.march`. Two roads lead to the equilibrium that a rod reaches
 when its load grows from zero:
 
 * In a uniform field, without weight and with one sign of magnetisation, a bracketed
-  Newton on the tip angle alone (`planar_one_sided`).
+  Newton on the tip angle alone (`planar.one_sided`).
 * Otherwise Newton on (gamma, x_L, y_L) from the straight rod, where that finds the
   branch from zero load: if the straight rod under full load has no unstable direction
   (then it has none under any smaller load, since its stiffness is linear in the load),
   and if the corrections shrink to a quarter from step to step, as the theorem of
-  Kantorovich asks for. Else load continuation (`planar_follow`).
+  Kantorovich asks for. Else load continuation (`planar.follow`).
 """
 
 from __future__ import annotations
@@ -223,7 +223,7 @@ def solve_rows(rods, fields, clamp, margins, s, order, step, cold, u, found, out
     Parameters
     ----------
     rods, fields : ndarray, shapes (n, k, 5), (n, 17)
-        See `planar_march`.
+        See `planar.march`.
     clamp : float
         Tangent angle at the clamp, in rad.
     margins : ndarray, shape (n,)

@@ -6,7 +6,7 @@ z the height, z' = psi. To second order the energy changes by half of
 
     integral of  psi'^2 / e + (N . t - e q^2) psi^2  -  sum over poles of dm Gzz z^2
 
-with N the force across the section (the P of `planar_march`), t the planar tangent, q
+with N the force across the section (the P of `planar.march`), t the planar tangent, q
 the planar moment, dm the jump of magnetisation and Gzz = dBz/dz = -(dBx/dx + dBy/dy).
 Its Jacobi fields march from the tip like the planar ones, with unknowns psi_L and z_L;
 each zero of their determinant is one unstable direction. A straight rod is the test:
@@ -43,11 +43,11 @@ def swing_index(rod, field, u, step):  # type: ignore[no-untyped-def]
     Parameters
     ----------
     rod, field : ndarray
-        See `planar_march`.
+        See `planar.march`.
     u : ndarray, shape (4,)
         The unknowns of the march at the equilibrium.
     step : float
-        What one step takes (`planar_march.substeps`).
+        What one step takes (`planar.march.substeps`).
 
     Returns
     -------

@@ -163,7 +163,7 @@ def parameter_columns(rod, field, u, rods, changes, clamps, s, order, step, out)
     s : ndarray, shape (n,)
         Stations.
     order, step
-        As of `planar_march.march`.
+        As of `planar.march.march`.
     out : ndarray, shape (n, 3, 4 b)
         Receives the derivatives of theta, x and y.
     """

@@ -1,6 +1,6 @@
 """The march of a rod that shears, stretches and feels its clamp, from the free tip.
 
-Dimensionless as `planar_march`: lengths over L, moments over EI_ref / L, forces over
+Dimensionless as `planar.march`: lengths over L, moments over EI_ref / L, forces over
 EI_ref / L^2, sigma = L - s, q = -M, P the pole load (exact here too, as long as the
 magnetic force follows r': see `solid`). With N and Q the components of P along and
 across the cross-section's normal t = (cos, sin)(theta), n = (-sin, cos)(theta), and the
@@ -157,7 +157,7 @@ def march(rod, field, base, clamp, load, u, order, X, S, b, trail, miss):  # typ
     Parameters
     ----------
     rod, field, base : ndarray
-        See the module's docstring; a field is as in `planar_march`.
+        See the module's docstring; a field is as in `planar.march`.
     clamp, load : float
         Angle of the clamp in rad; factor on all loads.
     u : ndarray, shape (4,)

@@ -1,6 +1,6 @@
 """Equilibria of the rod that shears and stretches: Newton, load continuation, index.
 
-Dimensionless as `solid_march`. Newton's matrix comes from differences of a march of
+Dimensionless as `solid.march`. Newton's matrix comes from differences of a march of
 coarse order; the zeros of its determinant along the rod give the Morse index.
 """
 

@@ -247,7 +247,7 @@ class _Held(NamedTuple):
 def _held(specimen: Specimen, support: Support, poisson_ratio: float) -> _Held:
     """Return what of a solve depends on the rod and its support alone.
 
-    `plain` is the rod as `planar_march` takes it, (n, 5), `rod` as `solid_march` does,
+    `plain` is the rod as `planar.march` takes it, (n, 5), `rod` as `solid.march` does,
     (n, 13). Then turn and shift of the base per root curvature; half the largest side;
     the largest magnetic load per tesla, and the weight; the largest compliances in
     bending and stretch; strain at the root's surface per moment; and the units.

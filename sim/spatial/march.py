@@ -1,6 +1,6 @@
 """The march of a rod in space from its free tip, with its variational columns.
 
-Dimensionless as `planar_march`: lengths over L, moments over EI_ref / L, forces over
+Dimensionless as `planar.march`: lengths over L, moments over EI_ref / L, forces over
 EI_ref / L^2, fields in T, sigma = L - s. Directors (d1, d2, d3) with d3 the tangent, at
 the clamp along (y, z, x). The state, shape (18,), holds
 
@@ -10,7 +10,7 @@ the clamp along (y, z, x). The state, shape (18,), holds
     n   the force in fixed components:  n' = grad(mu . B) + w
 
 (derivatives by sigma) with omega = m / (EI_1, EI_2, GJ) + rest curvature. The axial
-magnetisation is in n as a pole load, exactly (`planar_march`); `mu` is the transverse
+magnetisation is in n as a pole load, exactly (`planar.march`); `mu` is the transverse
 part only, with distributed torque and force.
 
 A column, shape (12,), holds (chi, dm, dr, dn): dR = R chi^, and the variations of m, r

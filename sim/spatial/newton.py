@@ -1,6 +1,6 @@
 """Equilibria of the rod in space: Newton on the tip's pose, load continuation.
 
-Dimensionless as `spatial_march`.
+Dimensionless as `spatial.march`.
 """
 
 from __future__ import annotations

@@ -69,10 +69,11 @@ def test_the_moment_of_one_force_costs_next_to_nothing(force):
     assert nullity == 4 + len(JOINTS)
     power = np.linalg.eigvalsh(penalty)
     assert power[0] > -1e-12 * power[-1]
-    cost, _ = costs(penalty, derivative(knots, FINE), kappa)
+    cost, size = costs(penalty, derivative(knots, FINE), kappa)
     whole = np.sum(np.gradient(kappa / COMPLIANCE, FINE) ** 2) * (FINE[1] - FINE[0])
     # What is left is the spline's: within a piece its M' runs straight.
-    assert -1e-12 * whole < cost < 1e-3 * whole
+    # Below zero by no more than its own sum is rounded, on any processor.
+    assert -1e-13 * size < cost < 1e-3 * whole
 
 
 def test_a_straight_rod_bears_forces_across_it_only():

@@ -235,7 +235,7 @@ def _dark_span(
     grey: Image, x: float, y: float, u: float, v: float, reach: float, sign: float,
     level: float,
 ) -> tuple[float, float]:  # fmt: skip
-    """Return where the dark begins and ends on a profile; see `rough_edges`."""
+    """Return where the dark begins and ends on a profile; see `edge.rough_edges`."""
     count = int(np.ceil(reach / STEP_PX))
     low, high = np.nan, np.nan
     for k in range(-count, count + 1):
