@@ -39,7 +39,7 @@ def ask_flux(gap_mm: float) -> float | None:
     StoppedError
         On Ctrl-C.
     """
-    from ..rig.stage.protocol import StoppedError
+    from ..rig.errors import StoppedError
 
     while True:
         try:

@@ -272,8 +272,8 @@ def _connected(rig: Path, port: str | None, log: Path | None) -> Iterator[GapSta
 def _told_how_to_go_on(stage: GapStage) -> Iterator[None]:
     """Let Ctrl-C stop the stage, and say what its position is worth then."""
     from ..core.errors import RigError
+    from ..rig.errors import StoppedError
     from ..rig.interrupts import interrupts
-    from ..rig.stage.protocol import StoppedError
 
     with interrupts(stage.request_stop) as received:
         try:

@@ -28,6 +28,12 @@ from .clock import (
 from .clock import (
     SystemClock as SystemClock,
 )
+from .errors import AlarmError as AlarmError
+from .errors import InterlockError as InterlockError
+from .errors import LinkLostError as LinkLostError
+from .errors import PositionLostError as PositionLostError
+from .errors import StageTimeoutError as StageTimeoutError
+from .errors import StoppedError as StoppedError
 from .link import (
     WireLog as WireLog,
 )
@@ -77,23 +83,5 @@ from .stage.marlin.stage import (
     MarlinStage as MarlinStage,
 )
 from .stage.protocol import (
-    AlarmError as AlarmError,
-)
-from .stage.protocol import (
-    InterlockError as InterlockError,
-)
-from .stage.protocol import (
-    LinkLostError as LinkLostError,
-)
-from .stage.protocol import (
-    PositionLostError as PositionLostError,
-)
-from .stage.protocol import (
     Stage as Stage,
-)
-from .stage.protocol import (
-    StageTimeoutError as StageTimeoutError,
-)
-from .stage.protocol import (
-    StoppedError as StoppedError,
 )

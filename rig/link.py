@@ -14,8 +14,8 @@ from typing import Any, TextIO
 
 from ..core.errors import StageError
 from .clock import Clock
-from .ports import why_not_open
-from .stage.protocol import LinkLostError
+from .errors import LinkLostError
+from .ports import register_twin_urls, why_not_open
 
 _SLICE_S = 0.02
 _MAX_LINE = 4096
@@ -109,8 +109,6 @@ class Link:
             If there is no such port, or another program holds it.
         """
         import serial
-
-        from .virtual import register_twin_urls
 
         register_twin_urls()
         try:

@@ -6,6 +6,17 @@ from dataclasses import dataclass
 
 from ..core.errors import StageError
 
+_TWIN_PORTS = "magbend.rig.virtual"
+
+
+def register_twin_urls() -> None:
+    """Let pyserial open ports named ``twin://...``: it imports the package itself."""
+    import serial
+
+    packages = serial.protocol_handler_packages
+    if _TWIN_PORTS not in packages:
+        packages.append(_TWIN_PORTS)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PortInfo:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from ...core.errors import ConfigError
 from ...core.magnet import Vector
@@ -20,35 +20,10 @@ from ...core.specimen import Specimen
 from ...core.specimen_file import MagnetModel, SpecimenModel, read_specimen
 from ...core.toml import FileModel, line_of, read_text, read_toml
 from ...core.units import GRAVITY_M_PER_S2
+from ..camera.config import CameraConfig
+from ..meter.config import MeterConfig
 from ..stage.config import LimitsConfig, StageConfig
 from .twin_config import TwinConfig
-
-
-class CameraConfig(FileModel):
-    """The ``[camera]`` table: where pictures come from and how long they may take."""
-
-    backend: Literal["auto", "opencv", "mjpeg", "folder", "video", "twin"] = "auto"
-    source: str | int = 0
-    watch: bool = False
-    width_px: PositiveInt | None = None
-    height_px: PositiveInt | None = None
-    exposure: float | None = None
-    gain: float | None = None
-    white_balance_K: PositiveFloat | None = None
-    frame_timeout_s: PositiveFloat = 5.0
-    latency_s: NonNegativeFloat = 0.2
-    warmup_s: NonNegativeFloat = 1.0
-    brightness_drift_percent: PositiveFloat = 3.0
-
-
-class MeterConfig(FileModel):
-    """The ``[meter]`` table: which Tesla-meter, and on which port."""
-
-    driver: str = "manual"
-    port: str = ""
-    description: Path | None = None
-    zero_mT: float = 0.0
-    sign: Literal[-1, 1] = 1
 
 
 class SettleConfig(FileModel):

@@ -8,12 +8,14 @@ from pathlib import Path
 
 from ...core.errors import CameraError, ConfigError, MeterError
 from ..camera.capture import CaptureCamera, Source
+from ..camera.config import CameraConfig
 from ..camera.protocol import Camera, NoCamera
 from ..clock import Clock
 from ..link import WireLog
+from ..meter.config import MeterConfig
 from ..meter.protocol import Ask, ManualMeter, Meter, NoMeter
 from ..stage.gap import GapStage
-from .config import CameraConfig, MeterConfig, Plan, RigModel
+from .config import Plan, RigModel
 from .devices import Devices
 
 

@@ -16,8 +16,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...core.errors import CameraError
-from ..bench.config import CameraConfig
 from ..clock import Check, Clock, go_on
+from .config import CameraConfig
 from .protocol import Frame, Image, brightness
 
 logger = logging.getLogger(__name__)

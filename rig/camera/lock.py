@@ -14,7 +14,7 @@ from typing import Any, Protocol
 
 import cv2
 
-from ..bench.config import CameraConfig
+from .config import CameraConfig
 
 PROPERTIES = {
     "width_px": cv2.CAP_PROP_FRAME_WIDTH,

@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 
 from ...core.errors import CameraError
-from ..bench.config import CameraConfig
 from ..clock import Clock
+from .config import CameraConfig
 from .lock import Settings, lock, not_kept, read_back
 from .mjpeg import decode_jpeg
 from .protocol import Image

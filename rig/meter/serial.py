@@ -16,8 +16,7 @@ import serial
 
 from ...core.errors import MeterError
 from ..clock import Check, go_on
-from ..ports import why_not_open
-from ..virtual import register_twin_urls
+from ..ports import register_twin_urls, why_not_open
 from .description import MeterDescription
 from .parse import parse_multiplier, parse_reply, parse_unit
 from .protocol import Flux, Sample, combine

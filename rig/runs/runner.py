@@ -20,10 +20,10 @@ from ..bench.config import Plan
 from ..bench.devices import Devices
 from ..camera.photo_flags import photo_flags
 from ..camera.protocol import brightness, encode_png, grab_median
+from ..errors import StoppedError
 from ..interrupts import Interrupts, StopAtOnce, interrupts
 from ..meter.protocol import Flux
 from ..stage.gap import MoveRecord
-from ..stage.protocol import StoppedError
 from .control import Report, RunControl, quiet
 from .folder import RunFolder
 from .manifest import make_manifest, require_same

@@ -12,10 +12,10 @@ from ...core.files import write_text
 from ...core.progress import Progress, silent
 from ..bench.devices import Devices
 from ..clock import Check, wait
+from ..errors import StoppedError
 from ..interrupts import interrupts
 from ..meter.protocol import Flux
 from ..stage.gap import GapStage
-from ..stage.protocol import StoppedError
 from .control import Report, quiet
 
 COLUMNS = "gap_mm,flux_mT,sd_mT,n"

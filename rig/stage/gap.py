@@ -15,18 +15,16 @@ from typing import Literal
 from ...core.checks import finite
 from ...core.progress import Progress, silent
 from ..clock import Clock
+from ..errors import InterlockError, PositionLostError, StageTimeoutError
 from .config import LimitsConfig, StageConfig
 from .interlock import check_feed, check_gap, check_homing, check_range
 from .protocol import (
-    InterlockError,
     Moved,
-    PositionLostError,
     PositionState,
     Stage,
     StageIdentity,
     StageLimits,
     StageState,
-    StageTimeoutError,
 )
 
 logger = logging.getLogger(__name__)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from ...core.checks import finite
+from ..errors import InterlockError
 from .config import LimitsConfig
-from .protocol import InterlockError, StageLimits
+from .protocol import StageLimits
 
 Range = tuple[float, float]
 

@@ -15,21 +15,13 @@ from typing import Generic, TypeVar
 
 from ...core.errors import StageError
 from ..clock import Clock
+from ..errors import InterlockError, PositionLostError, StoppedError
 from ..interrupts import StopAtOnce
 from ..link import Link, WireLog
 from ..ports import resolve_port
 from .config import StageConfig
 from .presence import Presence
-from .protocol import (
-    InterlockError,
-    Moved,
-    PositionLostError,
-    PositionState,
-    StageIdentity,
-    StageLimits,
-    StoppedError,
-    unheard,
-)
+from .protocol import Moved, PositionState, StageIdentity, StageLimits, unheard
 from .trust import Counting, PositionTrust
 
 logger = logging.getLogger(__name__)

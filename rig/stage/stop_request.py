@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ...core.errors import StageError
 from ..clock import Clock
+from ..errors import StageTimeoutError
 from ..link import Link
 from ..ports import resolve_port
 from .config import StageConfig
@@ -11,7 +12,6 @@ from .grbl.motion import await_stand, stands
 from .grbl.protocol import FEED_HOLD
 from .grbl.session import GrblSession
 from .presence import Presence
-from .protocol import StageTimeoutError
 
 _STOP_S = 15.0
 

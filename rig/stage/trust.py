@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from .protocol import PositionLostError, PositionState
+from ..errors import PositionLostError
+from .protocol import PositionState
 
 Place = tuple[float, ...]
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from magbend.core.errors import CameraError, ConfigError
-from magbend.rig.bench.config import CameraConfig
 from magbend.rig.bench.open import open_camera
 from magbend.rig.camera.capture import BrokenPictureError, TornPictureTest
+from magbend.rig.camera.config import CameraConfig
 from magbend.rig.camera.mjpeg import MultipartParser, decode_jpeg
 from magbend.rig.camera.protocol import encode_png, grab_median, median
 from magbend.rig.clock import SteppedClock, SystemClock

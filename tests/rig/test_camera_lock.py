@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from magbend.core.errors import CameraError
-from magbend.rig.bench.config import CameraConfig
 from magbend.rig.camera import opencv as camera_opencv
 from magbend.rig.camera.capture import CaptureCamera
+from magbend.rig.camera.config import CameraConfig
 from magbend.rig.camera.lock import AUTOMATIC, MANUAL, lock, not_kept
 from magbend.rig.clock import SystemClock
 

@@ -157,7 +157,7 @@ def test_ctrl_c_at_the_prompt_for_a_reading_stops_the_run(monkeypatch) -> None:
     import typer
 
     from magbend.cli.rig_bench import ask_flux
-    from magbend.rig.stage.protocol import StoppedError
+    from magbend.rig.errors import StoppedError
 
     def press(*_arguments, **_options) -> None:
         raise typer.Abort

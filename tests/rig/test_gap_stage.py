@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from magbend.core.errors import InputError
+from magbend.rig.errors import InterlockError, PositionLostError
 from magbend.rig.link import WireLog
 from magbend.rig.stage.config import LimitsConfig
-from magbend.rig.stage.protocol import InterlockError, PositionLostError
 from magbend.rig.virtual.board.plant import Plant
 
 from .stage_bench import SETTINGS, homed_bench, make_bench

@@ -8,12 +8,12 @@ import pytest
 
 from magbend.core.errors import StageError
 from magbend.rig.clock import SteppedClock
+from magbend.rig.errors import AlarmError, InterlockError, StageTimeoutError
 from magbend.rig.stage.config import StageConfig
 from magbend.rig.stage.grbl.audit import audit, audit_build, limits_of, notes
 from magbend.rig.stage.grbl.motion import Target
 from magbend.rig.stage.grbl.protocol import Setting, parse_line
 from magbend.rig.stage.grbl.stage import GrblStage
-from magbend.rig.stage.protocol import AlarmError, InterlockError, StageTimeoutError
 from magbend.rig.virtual.board.plant import Plant
 from magbend.rig.virtual.board.settings import DEFAULTS
 from magbend.rig.virtual.protocol_twin import register_board

@@ -7,15 +7,11 @@ import re
 import pytest
 
 from magbend.core.errors import StageError
+from magbend.rig.errors import PositionLostError, StageTimeoutError, StoppedError
 from magbend.rig.stage.config import LimitsConfig, StageConfig
 from magbend.rig.stage.gap import GapStage
 from magbend.rig.stage.marlin.session import read_position, read_setup
 from magbend.rig.stage.marlin.stage import MarlinStage
-from magbend.rig.stage.protocol import (
-    PositionLostError,
-    StageTimeoutError,
-    StoppedError,
-)
 from magbend.rig.virtual.protocol_twin import register_board
 
 from .stage_bench import InterruptingClock, interrupt

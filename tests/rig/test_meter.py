@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from magbend.core.errors import ConfigError, MeterError
-from magbend.rig.bench.config import MeterConfig
 from magbend.rig.bench.open import open_meter
+from magbend.rig.meter.config import MeterConfig
 from magbend.rig.meter.description import (
     MeterDescription,
     read_description,

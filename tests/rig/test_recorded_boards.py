@@ -12,16 +12,16 @@ from pathlib import Path
 
 import pytest
 
-from magbend.rig.stage.config import StageConfig
-from magbend.rig.stage.grbl.stage import GrblStage
-from magbend.rig.stage.protocol import (
+from magbend.rig.errors import (
     AlarmError,
     InterlockError,
     LinkLostError,
     PositionLostError,
-    StageError,
     StoppedError,
 )
+from magbend.rig.stage.config import StageConfig
+from magbend.rig.stage.grbl.stage import GrblStage
+from magbend.rig.stage.protocol import StageError
 from magbend.rig.virtual.protocol_twin import register_board
 
 from .recorded_board import SAID, RecordedBoard, hal_words, line

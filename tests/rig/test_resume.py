@@ -6,11 +6,11 @@ import pytest
 
 from magbend.core.errors import StoreError
 from magbend.rig.bench.config import read_plan
+from magbend.rig.errors import AlarmError, LinkLostError
 from magbend.rig.runs.control import RunControl
 from magbend.rig.runs.read import read_run
 from magbend.rig.runs.runner import run
 from magbend.rig.runs.verify import verify_run
-from magbend.rig.stage.protocol import AlarmError, LinkLostError
 
 
 def cut_off(bench, out: Path, move: str = "move -100") -> None:

@@ -9,11 +9,11 @@ import pandas as pd
 import pytest
 
 from magbend.core.errors import CameraError, StoreError
+from magbend.rig.errors import InterlockError, LinkLostError
 from magbend.rig.runs.control import RunControl
 from magbend.rig.runs.read import read_run
 from magbend.rig.runs.runner import run
 from magbend.rig.runs.verify import verify_run
-from magbend.rig.stage.protocol import InterlockError, LinkLostError
 
 
 def test_a_run_records_every_step_and_verifies(bench, tmp_path: Path) -> None:

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from magbend.core.errors import StoreError
+from magbend.rig.errors import InterlockError, LinkLostError
 from magbend.rig.runs.scan_field import scan_field
-from magbend.rig.stage.protocol import InterlockError, LinkLostError
 from magbend.sim.magnet.fit import read_readings
 
 

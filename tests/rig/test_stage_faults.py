@@ -6,15 +6,15 @@ from collections.abc import Callable
 
 import pytest
 
-from magbend.rig.interrupts import StopAtOnce
-from magbend.rig.stage.protocol import (
+from magbend.rig.errors import (
     AlarmError,
     LinkLostError,
     PositionLostError,
-    StageError,
     StageTimeoutError,
     StoppedError,
 )
+from magbend.rig.interrupts import StopAtOnce
+from magbend.rig.stage.protocol import StageError
 from magbend.rig.virtual.board.plant import Plant
 
 from .stage_bench import StageBench, homed_bench, interrupt, make_bench

@@ -6,8 +6,8 @@ import pytest
 
 from magbend.core.errors import ConfigError
 from magbend.rig.bench.file_edit import replace_gap_at_zero
+from magbend.rig.errors import StageTimeoutError
 from magbend.rig.stage.presence import Presence
-from magbend.rig.stage.protocol import StageTimeoutError
 from magbend.rig.stage.stop_request import stop_from_outside
 
 from .stage_bench import homed_bench

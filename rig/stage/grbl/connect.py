@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from ....core.errors import StageError
 from ...clock import Clock
+from ...errors import StageTimeoutError
 from ..config import StageConfig
-from ..protocol import StageTimeoutError
 from .protocol import FEED_HOLD, Message, Report, Setting
 from .session import CommandRefusedError, GrblSession
 

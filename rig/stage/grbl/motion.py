@@ -10,7 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from ...clock import Clock
-from ..protocol import Moved, StageTimeoutError
+from ...errors import StageTimeoutError
+from ..protocol import Moved
 from .protocol import Alarm, Ok, Refusal, Report, Triple
 from .session import CommandRefusedError, GrblSession
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ....core.errors import StageError
-from ..protocol import PositionLostError, StageTimeoutError
+from ...errors import PositionLostError, StageTimeoutError
 from ..trust import PositionTrust
 from .motion import stands
 from .protocol import Report, alarm_text

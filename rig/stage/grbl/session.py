@@ -11,8 +11,8 @@ import logging
 
 from ....core.errors import StageError
 from ...clock import Clock
+from ...errors import AlarmError, PositionLostError, StageTimeoutError
 from ...link import Link
-from ..protocol import AlarmError, PositionLostError, StageTimeoutError
 from .protocol import (
     SOFT_RESET,
     STATUS,

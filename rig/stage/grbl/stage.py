@@ -11,18 +11,16 @@ import contextlib
 from typing import NoReturn
 
 from ....core.errors import StageError
-from ...link import Link
-from ..protocol import (
+from ...errors import (
     AlarmError,
     InterlockError,
     LinkLostError,
-    Moved,
     PositionLostError,
-    StageIdentity,
-    StageStatus,
     StageTimeoutError,
     StoppedError,
 )
+from ...link import Link
+from ..protocol import Moved, StageIdentity, StageStatus
 from ..serial import MARGIN_S, STOPPED, SerialStage
 from . import audit as grbl_audit
 from .connect import FoundBoard, connect_board

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 from ....core.errors import StageError
 from ...clock import Clock
+from ...errors import PositionLostError, StageTimeoutError
 from ...link import Link
-from ..protocol import PositionLostError, StageTimeoutError
 
 _SLICE_S = 0.1
 _PATIENCE = 10.0

@@ -11,18 +11,10 @@ import math
 from collections.abc import Sequence
 
 from ....core.errors import StageError
+from ...errors import LinkLostError, PositionLostError, StageTimeoutError, StoppedError
 from ...link import Link
 from ..config import StageConfig
-from ..protocol import (
-    LinkLostError,
-    Moved,
-    PositionLostError,
-    StageIdentity,
-    StageLimits,
-    StageStatus,
-    StageTimeoutError,
-    StoppedError,
-)
+from ..protocol import Moved, StageIdentity, StageLimits, StageStatus
 from ..serial import MARGIN_S, SerialStage
 from .session import LineRefusedError, MarlinSession, MarlinSetup, read_setup
 

@@ -5,17 +5,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Generator
-from typing import TYPE_CHECKING
 
 from .gcode import GcodeError, read_line
 from .mover import Block
-from .orders import run_order
+from .orders import run_order, startup_lines
 from .realtime import realtime
-
-if TYPE_CHECKING:
-    from .firmware import GrblBoard
-
-Task = Generator[float, None, None]
+from .state import BoardState, Task
 
 _HELP = "[HLP:$$ $# $G $I $N $x=val $Nx=line $J=line $SLP $C $X $H ~ ! ? ctrl-x]"
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
@@ -23,7 +18,7 @@ _EEPROM_S = 0.008
 _POLL_S = 0.002
 
 
-def system_line(board: GrblBoard, line: str) -> Task:
+def system_line(board: BoardState, line: str) -> Task:
     """Carry out a line that begins with ``$``.
 
     Raises
@@ -52,7 +47,7 @@ def system_line(board: GrblBoard, line: str) -> Task:
         yield from _standing(board, body)
 
 
-def _always(board: GrblBoard, body: str) -> Task:
+def _always(board: BoardState, body: str) -> Task:
     if body == "$":
         if board.state in ("Run", "Hold"):
             raise GcodeError(8)
@@ -74,7 +69,7 @@ def _always(board: GrblBoard, body: str) -> Task:
         yield from board.print_line("[MSG:Enabled]")
 
 
-def _standing(board: GrblBoard, body: str) -> Task:
+def _standing(board: BoardState, body: str) -> Task:
     if body == "#":
         for row in board.offsets_report():
             yield from board.print_line(row)
@@ -102,7 +97,7 @@ def _standing(board: GrblBoard, body: str) -> Task:
         yield from _store(board, body)
 
 
-def _startup(board: GrblBoard, body: str) -> Task:
+def _startup(board: BoardState, body: str) -> Task:
     if body == "N":
         for index, text in enumerate(board.eeprom.startup):
             yield from board.print_line(f"$N{index}={text}")
@@ -117,7 +112,7 @@ def _startup(board: GrblBoard, body: str) -> Task:
     board.eeprom.startup[int(match.group(1))] = match.group(2)
 
 
-def _store(board: GrblBoard, body: str) -> Task:
+def _store(board: BoardState, body: str) -> Task:
     name = re.match(_NUMBER, body)
     if not name:
         raise GcodeError(2 if body[0] not in "SIR" else 3)
@@ -136,7 +131,7 @@ def _store(board: GrblBoard, body: str) -> Task:
     yield from board.pause(_EEPROM_S)
 
 
-def home(board: GrblBoard) -> Task:
+def home(board: BoardState) -> Task:
     """``$H`` of the stock build: Z first, then X and Y."""
     board.homing = True
     for axes in ((2,), (0, 1)):
@@ -151,10 +146,10 @@ def home(board: GrblBoard) -> Task:
     board.planned = list(board.position)
     board.switches_seen = board.plant.switches()
     board.state = "Idle"
-    yield from board.startup_lines()
+    yield from startup_lines(board)
 
 
-def _home_axes(board: GrblBoard, axes: tuple[int, ...]) -> Task:
+def _home_axes(board: BoardState, axes: tuple[int, ...]) -> Task:
     seek, locate, pull_off = (board.eeprom[n] for n in (25, 24, 27))
     longest = 1.5 * max(board.eeprom[130 + axis] for axis in axes)
     phases = (
@@ -179,7 +174,7 @@ def _home_axes(board: GrblBoard, axes: tuple[int, ...]) -> Task:
 
 
 def _home_phase(
-    board: GrblBoard,
+    board: BoardState,
     axes: tuple[int, ...],
     travel_mm: float,
     rate_mm_min: float,

@@ -14,24 +14,15 @@ Source of the behaviour: gnea/grbl 1.1h (``protocol.c``, ``system.c``, ``limits.
 from __future__ import annotations
 
 import math
-from collections import deque
-from collections.abc import Generator
 
 from .commands import system_line
 from .gcode import GcodeError, Modal, read_line
-from .line import BoardLine
-from .mover import Mover
-from .orders import auto_start, run_order
+from .orders import auto_start, run_order, startup_lines
 from .plant import Plant
 from .realtime import realtime
-from .report import Counters
-from .settings import OFFSET_ROWS, Eeprom
+from .state import RX_BYTES, BoardState, Counters, Task
 
-Task = Generator[float, None, None]
-
-RX_BYTES = 128
 _LINE_CHARS = 79
-_TX_BYTES = 104
 _TICK_S = 0.005
 _PASS_S = 2e-5
 _BANNER = "\r\nGrbl 1.1h ['$' for help]"
@@ -40,7 +31,7 @@ _OVERRIDES = {
 }  # fmt: skip
 
 
-class GrblBoard(BoardLine):
+class GrblBoard(BoardState):
     """The board, its settings memory and its stage.
 
     Parameters
@@ -54,18 +45,7 @@ class GrblBoard(BoardLine):
     def __init__(
         self, plant: Plant | None = None, settings: dict[int, float] | None = None
     ) -> None:
-        super().__init__()
-        self.plant = plant or Plant()
-        self.eeprom = Eeprom(settings)
-        self.mover = Mover(self._on_step)
-        self.state = "Idle"
-        self.position = [0, 0, 0]
-        self.alarm = self.switches_seen = 0
-        self.homing = False
-        self.flags: set[str] = set()
-        self._rx: deque[int] = deque()
-        self.direction = [0.0, 0.0, 0.0]
-        self._wake_s = self._blocked_s = 0.0
+        super().__init__(plant, settings)
         self._power_up()
 
     # --- what the outside sees ------------------------------------------------
@@ -129,16 +109,6 @@ class GrblBoard(BoardLine):
             self.reset_from_anywhere()
             self.alarm = 1
 
-    def _flag(self, name: str) -> None:
-        """Set a flag and wake the main loop, wherever it waits."""
-        self.flags.add(name)
-        self._wake_s = min(self._wake_s, self.now_s)
-
-    def _on_step(self, axis: int, count: int) -> None:
-        self.position[axis] += count
-        inverted = int(self.eeprom[3]) >> axis & 1
-        self.plant.step(axis, -count if inverted else count)
-
     # --- reset, flags, real-time bytes ----------------------------------------
 
     def _power_up(self) -> None:
@@ -170,16 +140,6 @@ class GrblBoard(BoardLine):
             self._rx.append(byte)
             self._wake_s = min(self._wake_s, self.now_s)
 
-    def reset_from_anywhere(self) -> None:
-        """Set the reset flag, as the interrupt does; a moving stage stops, alarmed."""
-        if "reset" in self.flags:
-            return
-        self._flag("reset")
-        if self.state in ("Run", "Home", "Jog") or self.stopping or self.homing:
-            if not self.alarm:
-                self.alarm = 6 if self.state == "Home" else 3
-            self.mover.kill()
-
     # --- main loop ------------------------------------------------------------
 
     def _firmware(self) -> Task:
@@ -208,7 +168,7 @@ class GrblBoard(BoardLine):
             yield from self.print_line("[MSG:'$H'|'$X' to unlock]")
         else:
             self.state = "Idle"
-            yield from self.startup_lines()
+            yield from startup_lines(self)
         line, skipping = "", ""
         while True:
             while self._rx:
@@ -251,51 +211,3 @@ class GrblBoard(BoardLine):
         except GcodeError as error:
             code = error.code
         yield from self.print_line(f"error:{code}" if code else "ok")
-
-    def startup_lines(self) -> Task:
-        """Run ``$N0`` and ``$N1`` and echo them."""
-        for text in self.eeprom.startup:
-            if text:
-                yield from run_order(self, read_line(text, self.modal, jog=False))
-                yield from self.print_line(f">{text}:ok")
-
-    def print_line(self, text: str) -> Task:
-        """Print a line; a full transmit buffer holds the firmware up."""
-        self.send(text.encode("ascii") + b"\r\n")
-        while (free_s := self.sending_s(_TX_BYTES)) > self.now_s:
-            yield free_s
-
-    def pause(self, duration_s: float) -> Task:
-        """Wait without looking at any flag."""
-        end_s = self.now_s + duration_s
-        while self.now_s < end_s:
-            yield end_s
-
-    @property
-    def rx_free(self) -> int:
-        """Free bytes of the receive buffer."""
-        return RX_BYTES - len(self._rx)
-
-    # --- what its other parts ask ---------------------------------------------
-
-    def planned_mm(self) -> list[float]:
-        """Return where the queued motions end, in machine mm."""
-        return [
-            s / k if (k := self.eeprom[100 + axis]) else 0.0
-            for axis, s in enumerate(self.planned)
-        ]
-
-    def offset_mm(self) -> list[float]:
-        """Return the work offset WCO, in mm."""
-        system = self.eeprom.offsets[f"G{self.modal.system}"]
-        return [a + b for a, b in zip(system, self.g92, strict=True)]
-
-    def offsets_report(self) -> list[str]:
-        """Return the rows of ``$#``."""
-        rows = [f"[{row}:{_three(self.eeprom.offsets[row])}]" for row in OFFSET_ROWS]
-        tail = ["[TLO:0.000]", "[PRB:0.000,0.000,0.000:0]"]
-        return [*rows, f"[G92:{_three(self.g92)}]", *tail]
-
-
-def _three(values: list[float]) -> str:
-    return ",".join(f"{value:.3f}" for value in values)

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from .gcode import Order
 from .mover import Block
-
-if TYPE_CHECKING:
-    from .firmware import GrblBoard
+from .state import BoardState
 
 
-def target_of(board: GrblBoard, order: Order) -> list[float]:
+def target_of(board: BoardState, order: Order) -> list[float]:
     """Return the machine position in mm that a line asks for."""
     target, offset = board.planned_mm(), board.offset_mm()
     for axis, value in order.axes.items():
@@ -25,7 +22,7 @@ def target_of(board: GrblBoard, order: Order) -> list[float]:
     return target
 
 
-def set_offset(board: GrblBoard, order: Order) -> None:
+def set_offset(board: BoardState, order: Order) -> None:
     """Carry out G92, G92.1 or G10."""
     board.counters.offset = 0
     if order.kind == "G92.1":
@@ -43,7 +40,7 @@ def set_offset(board: GrblBoard, order: Order) -> None:
             system[axis] = here[axis] - board.g92[axis] - value
 
 
-def outside(board: GrblBoard, target: list[float]) -> bool:
+def outside(board: BoardState, target: list[float]) -> bool:
     """Return whether a target in mm lies beyond the travel."""
     return any(
         place > 0.0 or place < -board.eeprom[130 + axis]
@@ -51,7 +48,7 @@ def outside(board: GrblBoard, target: list[float]) -> bool:
     )
 
 
-def plan(board: GrblBoard, target: list[float], feed_mm_min: float) -> None:
+def plan(board: BoardState, target: list[float], feed_mm_min: float) -> None:
     """Queue a straight motion to a target in mm, if it is one step away at least."""
     per_mm = [board.eeprom[100 + axis] for axis in range(3)]
     steps = [round(place * k) for place, k in zip(target, per_mm, strict=True)]
@@ -79,7 +76,7 @@ def plan(board: GrblBoard, target: list[float], feed_mm_min: float) -> None:
     board.planned = steps
 
 
-def _junction(board: GrblBoard, moves: list[float], length_mm: float) -> float:
+def _junction(board: BoardState, moves: list[float], length_mm: float) -> float:
     """Return the speed through the corner: straight on is free, back is a stop."""
     if not board.mover.blocks:
         return 0.0

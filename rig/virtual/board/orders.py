@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
-from typing import TYPE_CHECKING
 
-from .gcode import GcodeError, Modal, Order
+from .gcode import GcodeError, Modal, Order, read_line
 from .motion import outside, plan, set_offset, target_of
 from .realtime import realtime
+from .state import BoardState, Task
 
-if TYPE_CHECKING:
-    from .firmware import GrblBoard
-
-Task = Generator[float, None, None]
 _TICK_S = 0.005
 
 
-def auto_start(board: GrblBoard) -> None:
+def auto_start(board: BoardState) -> None:
     """Start what is queued, if the board is idle."""
     if board.mover.blocks and board.state == "Idle":
         board.flags.add("start")
 
 
-def _wait_until_done(board: GrblBoard) -> Task:
+def _wait_until_done(board: BoardState) -> Task:
     auto_start(board)
     while True:
         yield from realtime(board)
@@ -32,7 +27,7 @@ def _wait_until_done(board: GrblBoard) -> Task:
         yield math.inf if not board.flags else board.now_s
 
 
-def run_order(board: GrblBoard, order: Order, *, jog: bool = False) -> Task:
+def run_order(board: BoardState, order: Order, *, jog: bool = False) -> Task:
     """Carry out one checked line."""
     if not jog:
         if order.modal.system != board.modal.system:
@@ -60,7 +55,7 @@ def run_order(board: GrblBoard, order: Order, *, jog: bool = False) -> Task:
         yield from board.print_line("[MSG:Pgm End]")
 
 
-def _dwell(board: GrblBoard, duration_s: float) -> Task:
+def _dwell(board: BoardState, duration_s: float) -> Task:
     end_s = board.now_s + duration_s
     while board.now_s < end_s and not board.aborted:
         yield min(end_s, board.now_s + 0.05)
@@ -68,7 +63,7 @@ def _dwell(board: GrblBoard, duration_s: float) -> Task:
 
 
 def _line(
-    board: GrblBoard, target: list[float], order: Order, *, jog: bool = False
+    board: BoardState, target: list[float], order: Order, *, jog: bool = False
 ) -> Task:
     if not jog and board.eeprom.flag(20) and outside(board, target):
         yield from _soft_limit_alarm(board)
@@ -90,7 +85,7 @@ def _line(
         board.mover.start(board.now_s)
 
 
-def _soft_limit_alarm(board: GrblBoard) -> Task:
+def _soft_limit_alarm(board: BoardState) -> Task:
     board.soft_limit = True
     if board.state == "Run":
         board.flags.add("hold")
@@ -102,3 +97,11 @@ def _soft_limit_alarm(board: GrblBoard) -> Task:
     board.reset_from_anywhere()
     board.alarm = 2
     yield from realtime(board)
+
+
+def startup_lines(board: BoardState) -> Task:
+    """Run ``$N0`` and ``$N1`` and echo them."""
+    for text in board.eeprom.startup:
+        if text:
+            yield from run_order(board, read_line(text, board.modal, jog=False))
+            yield from board.print_line(f">{text}:ok")

@@ -7,18 +7,12 @@ nowhere else. That is why it is deaf where the real one is.
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
-from typing import TYPE_CHECKING
 
 from .report import status_report
-
-if TYPE_CHECKING:
-    from .firmware import GrblBoard
-
-Task = Generator[float, None, None]
+from .state import BoardState, Task
 
 
-def realtime(board: GrblBoard) -> Task:
+def realtime(board: BoardState) -> Task:
     """Look at the flags; stay here while suspended."""
     yield from _flag_pass(board)
     if board.state == "Sleep" and board.suspended:
@@ -28,7 +22,7 @@ def realtime(board: GrblBoard) -> Task:
         yield from _flag_pass(board)
 
 
-def _flag_pass(board: GrblBoard) -> Task:
+def _flag_pass(board: BoardState) -> Task:
     if board.alarm:
         yield from _enter_alarm(board)
     if "reset" in board.flags:
@@ -45,7 +39,7 @@ def _flag_pass(board: GrblBoard) -> Task:
         _take_cycle_stop(board)
 
 
-def _enter_alarm(board: GrblBoard) -> Task:
+def _enter_alarm(board: BoardState) -> Task:
     code, board.alarm = board.alarm, 0
     board.state = "Alarm"
     yield from board.print_line(f"ALARM:{code}")
@@ -57,7 +51,7 @@ def _enter_alarm(board: GrblBoard) -> Task:
             yield math.inf
 
 
-def _take_hold(board: GrblBoard) -> None:
+def _take_hold(board: BoardState) -> None:
     flags = board.flags & {"hold", "cancel", "sleep"}
     board.flags -= flags
     if board.state in ("Alarm", "Check"):
@@ -79,7 +73,7 @@ def _take_hold(board: GrblBoard) -> None:
         board.counters.overrides = 0  # spindle and coolant are switched off
 
 
-def _take_start(board: GrblBoard) -> None:
+def _take_start(board: BoardState) -> None:
     board.flags.discard("start")
     if not (board.state == "Idle" or (board.state == "Hold" and board.held)):
         return
@@ -91,7 +85,7 @@ def _take_start(board: GrblBoard) -> None:
         board.state = "Idle"
 
 
-def _take_cycle_stop(board: GrblBoard) -> None:
+def _take_cycle_stop(board: BoardState) -> None:
     board.flags.discard("cycle stop")
     waits = board.state in ("Hold", "Sleep")
     if waits and not board.soft_limit and not board.cancelling:

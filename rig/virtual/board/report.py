@@ -3,25 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from .firmware import GrblBoard
+from .state import BoardState
 
 _BUSY = ("Home", "Run", "Hold", "Jog")
 _OFFSET_EVERY = {True: 30, False: 10}
 _OVERRIDES_EVERY = {True: 20, False: 10}
 
 
-class Counters:
-    """Reports left until the work offset and the overrides are shown again."""
-
-    def __init__(self) -> None:
-        self.offset = 0
-        self.overrides = 0
-
-
-def status_report(board: GrblBoard) -> str:
+def status_report(board: BoardState) -> str:
     """Return the answer to ``?``."""
     busy = board.state in _BUSY
     mask = int(board.eeprom[10])
@@ -46,7 +36,7 @@ def status_report(board: GrblBoard) -> str:
     return "<" + "|".join(parts + _extras(board, busy, offset)) + ">"
 
 
-def _extras(board: GrblBoard, busy: bool, offset: list[float]) -> list[str]:
+def _extras(board: BoardState, busy: bool, offset: list[float]) -> list[str]:
     counters, extras = board.counters, []
     if counters.offset > 0:
         counters.offset -= 1
@@ -63,7 +53,7 @@ def _extras(board: GrblBoard, busy: bool, offset: list[float]) -> list[str]:
     return extras
 
 
-def _state(board: GrblBoard) -> str:
+def _state(board: BoardState) -> str:
     if board.state == "Hold":
         return "Hold:0" if board.held else "Hold:1"
     return board.state
