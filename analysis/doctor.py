@@ -6,7 +6,6 @@ import importlib
 import os
 import platform
 import sys
-import tempfile
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -112,16 +111,16 @@ def _extras() -> list[Finding]:
 
 def _kernel_cache() -> Finding:
     """Compiled kernels are kept between runs only where the user may write."""
-    import numba
+    from ..sim.planar.march import march
 
-    chosen = numba.config.CACHE_DIR
-    folder = Path(chosen) if chosen else Path(__file__).parent.parent / "sim"
-    try:
-        with tempfile.TemporaryFile(dir=folder):
-            detail = str(folder)
-    except OSError:
-        detail = "the user's cache folder (the installation is read-only)"
-    return Finding(subject="kernel cache", status="ok", detail=detail)
+    folder = march.cache_folder
+    if folder:
+        return Finding(subject="kernel cache", status="ok", detail=folder)
+    detail = (
+        "no folder can be written: every command compiles its kernels anew, up to a "
+        "minute; set NUMBA_CACHE_DIR to a folder of yours"
+    )
+    return Finding(subject="kernel cache", status="absent", detail=detail)
 
 
 def _self_test() -> Finding:

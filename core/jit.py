@@ -54,14 +54,23 @@ class Kernel:
         if self._compiled is None:
             with _LOCK:
                 if self._compiled is None:
-                    from numba import njit as numba_njit
-
-                    compiled = numba_njit(**self._options)(self._function)
-                    if self._options.get("cache"):
-                        file = compiled._cache._cache_file
-                        file._source_stamp = (file._source_stamp, self.fingerprint)
-                    self._compiled = compiled
+                    self._compiled = self._compile()
         return self._compiled
+
+    def _compile(self) -> Any:
+        from numba import njit as numba_njit
+
+        try:
+            compiled = numba_njit(**self._options)(self._function)
+        except RuntimeError as error:
+            if "no locator available" not in str(error):
+                raise
+            # Neither beside the source nor in the home can anything be written.
+            return numba_njit(**{**self._options, "cache": False})(self._function)
+        if self._options.get("cache"):
+            file = compiled._cache._cache_file
+            file._source_stamp = (file._source_stamp, self.fingerprint)
+        return compiled
 
     @functools.cached_property
     def fingerprint(self) -> str:
@@ -81,9 +90,15 @@ class Kernel:
         return digest.hexdigest()
 
     @property
+    def cache_folder(self) -> str:
+        """Where machine code is kept; empty if nothing can be written."""
+        return str(getattr(self.compiled._cache, "cache_path", None) or "")
+
+    @property
     def is_stored(self) -> bool:
         """Whether machine code of this very kernel waits in numba's cache."""
-        return bool(self.compiled._cache._cache_file._load_index())
+        file = getattr(self.compiled._cache, "_cache_file", None)
+        return file is not None and bool(file._load_index())
 
     @property
     def _numba_type_(self) -> Any:

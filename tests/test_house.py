@@ -11,7 +11,6 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = ("core", "sim", "vision", "rig", "analysis", "cli")
 
 
 def tracked() -> list[Path]:
@@ -26,10 +25,11 @@ def tracked() -> list[Path]:
 def test_every_package_folder_is_installed() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     listed = set(settings["tool"]["setuptools"]["packages"])
+    folders = settings["tool"]["setuptools"]["package-dir"]
     on_disk = {
-        "magbend." + ".".join(init.parent.relative_to(ROOT).parts)
-        for package in PACKAGES
-        for init in (ROOT / package).rglob("__init__.py")
+        ".".join([name, *init.parent.relative_to(ROOT / folder).parts])
+        for name, folder in folders.items()
+        for init in (ROOT / folder).rglob("__init__.py")
     }
     assert listed == on_disk
 

@@ -173,7 +173,7 @@ def find_equilibria(
     ...                sections=(Section(length_mm=30.0, E_MPa=10.0),))
     >>> found = find_equilibria(rod, UniformField(flux_mT=1500.0))
     >>> [(round(e.theta_tip_rad, 3), e.morse_index) for e in found]
-    [(-4.596, 0), (-3.745, 1), (1.557, 0)]
+    [(-4.591, 0), (-3.549, 1), (1.55, 0)]
     """
     points = whole(points, 2, 1_000_000, "points")
     rod = planar_rod(specimen, field, support or Support())

@@ -137,3 +137,27 @@ def test_stored_code_is_not_used_once_a_kernel_it_holds_has_changed(
     assert run(2.0) == "False 3.0"
     assert run(2.0) == "True 3.0"
     assert run(5.0) == "False 6.0"
+
+
+NOWHERE = """
+import magbend.core.jit as jit
+import numba.core.caching as caching
+
+caching.CacheImpl._locator_classes = []
+caching.CompileResultCacheImpl._locator_classes = []
+
+@jit.njit(cache=True)
+def twice(x):
+    return 2.0 * x
+
+print(twice(4.0), twice.is_stored)
+"""
+
+
+def test_kernels_run_where_nothing_may_be_written(tmp_path: Path) -> None:
+    (tmp_path / "nowhere.py").write_text(NOWHERE)
+    done = subprocess.run(
+        [sys.executable, "-B", tmp_path / "nowhere.py"],
+        check=True, capture_output=True, text=True,
+    )  # fmt: skip
+    assert done.stdout.strip() == "8.0 False"
