@@ -10,7 +10,12 @@ from scipy.special import erf
 
 from magbend.vision import as_photo, extract
 from magbend.vision.edge.clamp import ClampLines, between
-from magbend.vision.edge.tip import EndFace, crossings_of, fit_step, line_through
+from magbend.vision.edge.step_line import (
+    EndFace,
+    crossings_of,
+    fit_step,
+    line_through,
+)
 from magbend.vision.synthetic.frames import CLEAN, curve, draw
 from magbend.vision.synthetic.score import signed_distance
 

@@ -17,7 +17,15 @@ from numpy.typing import NDArray
 from ...core.jit import njit
 from ..curve.curve import Curve
 from .edges import clear_of
-from .tip import SPAN, STEP_PX, EndFace, crossings_of, fit_step, lanes, line_through
+from .step_line import (
+    SPAN,
+    STEP_PX,
+    EndFace,
+    crossings_of,
+    fit_step,
+    lanes,
+    line_through,
+)
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]

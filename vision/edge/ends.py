@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from ..curve.curve import Curve
 from ..curve.robust import median
-from ..find.rod import Root
 from .clamp import ClampLines, between, find_clamp
-from .state import LostError, Seen, State
-from .tip import EndFace, find_tip
+from .state import LostError, Root, Seen, State
+from .step_line import EndFace
+from .tip import find_tip
 from .wall_light import MIRRORED, SKY, Walls, short_of_end, wall_light
 
 Array = NDArray[np.float64]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,8 @@ from ..curve.curve import Curve
 from .edges import Edges
 
 Array = NDArray[np.float64]
+Root = Literal["clamp", "border", "free"]
+"""What a rod grows from."""
 
 
 class LostError(Exception):

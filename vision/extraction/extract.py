@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
 
 import cv2
 import numpy as np
@@ -14,8 +13,9 @@ from ...core.errors import MagbendError
 from ..camera.calibration import Calibration
 from ..curve.curve import Curve
 from ..edge.state import LostError
-from ..find.binarise import Binary, binarise, rebinarise
-from ..find.rod import LEAST_SHARE, Candidate, find_candidates
+from ..find.binarise import binarise
+from ..find.choose import Clamp, find_rod
+from ..find.rod import Candidate
 from ..find.track import Start, start_curve
 from ..measurement import Measurement, failure
 from ..picture.photo import Photo
@@ -25,18 +25,11 @@ from .specimen_frame import Setting, measurement
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
-Clamp = Literal["auto", "none"]
 
 _BROKEN = (
     np.linalg.LinAlgError, ArithmeticError, ValueError, IndexError, cv2.error
 )  # fmt: skip
 """What numerics raise on pictures that hold no rod after all."""
-
-_PALER = 0.25
-"""How much lighter than the rod, of the paper's light, a thing is that is no rod."""
-
-LEAST_LENGTH = 0.08
-"""Shortest rod, in diagonals of the picture: below that it is dust, hair or print."""
 
 
 SMOOTH = 0.12
@@ -113,7 +106,7 @@ def _extract(
     binary = binarise(photo.grey, invert=invert)
     if binary is None:
         return _empty(photo)
-    binary, candidate = _find(photo, binary, invert, clamp)
+    binary, candidate = find_rod(photo, binary, invert, clamp)
     sign = -1.0 if binary.inverted else 1.0
     grey, start = photo.grey, _start(photo.grey, candidate, sign)
     if start.rough:
@@ -153,109 +146,3 @@ def _empty(photo: Photo) -> Measurement:
     if float(photo.grey.max()) < 0.02:
         return failure("underexposed", "the picture is black all over; expose it more")
     return failure("no_rod", "nothing stands out from the background")
-
-
-def _find(
-    photo: Photo, binary: Binary, invert: bool | None, clamp: Clamp
-) -> tuple[Binary, Candidate]:
-    """Return the rod and its mask; glints make grey paper look like a dark board."""
-    try:
-        return binary, _choose(binary, clamp)
-    except LostError as lost:
-        if lost.flag != "no_rod" or invert is not None or not binary.inverted:
-            raise
-        dark = binarise(photo.grey, invert=False)
-        if dark is None:
-            raise
-        return dark, _choose(dark, clamp)
-
-
-def _choose(binary: Binary, clamp: Clamp) -> Candidate:
-    """Return the rod; a paler clamp shows only at higher levels."""
-    best: Candidate | None = None
-    least = LEAST_LENGTH * binary.factor * float(np.hypot(*binary.mask.shape))
-    for level in _levels(binary):
-        at_level = binary if level == binary.threshold else rebinarise(binary, level)
-        rods = [item for item in find_candidates(at_level) if item.length_px > least]
-        if not rods:
-            continue
-        rod = _likeliest(rods)
-        _refuse_second(rod, rods)
-        # What shows only where less is dark may be the clamp's shade: seek its root.
-        alike = best is None or _is_part(best, rod)
-        if rod.root != "free" and alike:
-            return _accept(rod)
-        best = best or rod
-    if best is None:
-        raise LostError("no_rod", "nothing in the picture is long and thin like a rod")
-    if clamp == "none":
-        return best
-    raise LostError(
-        "no_clamp",
-        "the rod grows from no clamp and from no border of the picture; "
-        "for a rod that floats freely say so with clamp none",
-    )
-
-
-def _levels(binary: Binary) -> list[float]:
-    """Return the levels to try: a pale rod on a board is best told from the board."""
-    first = binary.threshold
-    higher = [level for level in (0.6, 0.75) if level > first + 0.05]
-    return [*higher, first] if binary.inverted else [first, *higher]
-
-
-def _is_part(one: Candidate, other: Candidate) -> bool:
-    """Whether a candidate's middle lies on another."""
-    middle = one.points_px[len(one.points_px) // 2]
-    return other.away(middle) < max(one.width_px, other.width_px)
-
-
-def _likeliest(rods: list[Candidate]) -> Candidate:
-    """Return the longest that is no hair, but rather one in a clamp than another."""
-    thick = [
-        rod
-        for rod in rods
-        if not any(
-            rod.width_px < 0.5 * other.width_px
-            and rod.root != "clamp"
-            and other.length_px > LEAST_SHARE * rod.length_px
-            and other.ratio < rod.ratio + 0.1
-            for other in rods
-        )
-    ]
-    clamped = [
-        rod
-        for rod in thick
-        if rod.root == "clamp" and rod.length_px > LEAST_SHARE * thick[0].length_px
-    ]
-    return clamped[0] if clamped else thick[0]
-
-
-def _refuse_second(first: Candidate, rods: list[Candidate]) -> None:
-    alike = [
-        other
-        for other in rods
-        if other is not first
-        and 0.5 < other.width_px / first.width_px < 2.0
-        and other.length_px > 0.4 * first.length_px
-        and other.ratio < first.ratio + _PALER
-    ]
-    if len(alike) == 1:
-        raise LostError(
-            "two_rods",
-            "there are two things like a rod in the picture; cover one of them",
-        )
-    if alike:
-        raise LostError(
-            "no_rod",
-            f"there are {len(alike) + 1} long and thin things in the picture and none "
-            "that stands out as the rod",
-        )
-
-
-def _accept(rod: Candidate) -> Candidate:
-    if rod.contacts > 1:
-        flag = "touches_border" if rod.root == "border" else "touches_object"
-        what = "the border of the picture" if rod.root == "border" else "another object"
-        raise LostError(flag, f"the rod touches {what} besides its root")
-    return rod

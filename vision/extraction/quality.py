@@ -9,7 +9,7 @@ import numpy as np
 from ..camera.calibration import Calibration
 from ..curve.robust import median, quantile
 from ..edge.state import LostError
-from ..edge.tip import lanes
+from ..edge.step_line import lanes
 from ..find.rod import Candidate
 from ..measurement import Measurement
 from ..picture.photo import Photo

@@ -19,10 +19,9 @@ from ..curve.spline import Smooth
 from ..edge.clamp import ClampLines
 from ..edge.edges import Edges, find_edges
 from ..edge.ends import find_ends
-from ..edge.state import LostError, Seen, State
-from ..edge.tip import EndFace
+from ..edge.state import LostError, Root, Seen, State
+from ..edge.step_line import EndFace
 from ..edge.wall_light import Walls, to_wall_ends
-from ..find.rod import Root
 from ..find.track import FLARED, Start
 
 Array = NDArray[np.float64]

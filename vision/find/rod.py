@@ -9,7 +9,6 @@ rod's pixels, and the centres of its level sets are the start curve.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import cv2
 import numpy as np
@@ -17,13 +16,13 @@ from numpy.typing import NDArray
 
 from ...core.jit import njit
 from ..curve.robust import median
+from ..edge.state import Root
 from .binarise import Binary
 from .discs import near_core
 from .level_sets import level_sets
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
-Root = Literal["clamp", "border", "free"]
 
 LEAST_SLENDERNESS = 6.0
 """Shortest rod, in widths."""
