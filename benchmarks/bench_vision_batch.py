@@ -19,7 +19,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from magbend.vision import Settings, extract, extract_files, read_photo
+from magbend.vision import Setting, extract, extract_files, read_photo
 from magbend.vision.batch.overlay import overlay_png
 from magbend.vision.synthetic.frames import LIGHTS, SHAPES, curve, draw
 
@@ -74,7 +74,7 @@ def on_several(paths, camera, out: Path, workers: int, *, overlays: bool) -> Non
     seen: list[tuple[int, float]] = []
     before = of_children()
     extract_files(
-        paths, out, settings=Settings(calibration=camera), overlays=overlays,
+        paths, out, setting=Setting(calibration=camera), overlays=overlays,
         workers=workers, progress=lambda done, _: seen.append((done, time.monotonic())),
     )  # fmt: skip
     cpu = of_children() - before

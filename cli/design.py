@@ -140,10 +140,11 @@ def _goal(
         return goals.curve_goal(goals.read_points(curve, ("x_mm", "y_mm")))
     if polyline is None or calibration is None:
         raise InputError("--polyline needs the --calibration of its photograph")
-    from ..vision import Calibration
+
+    from ..vision import read_calibration
 
     points_px = goals.read_points(polyline, ("x_px", "y_px"))
-    camera = Calibration.load(calibration)
+    camera = read_calibration(calibration)
     points_mm = camera.to_mm(points_px, height_mm=rod_height_mm)
     return goals.curve_goal(points_mm, align=True)
 

@@ -14,10 +14,7 @@ from ..core.errors import InputError
 from .console import JSON, group, print_json, progress
 
 if TYPE_CHECKING:
-    from ..vision.batch.run import Settings
-    from ..vision.batch.tables import FrameRow
-    from ..vision.camera.board import Board
-    from ..vision.camera.calibration import Calibration
+    from ..vision import Board, Calibration, FrameRow, Setting
 
 app = group(
     "vision",
@@ -42,8 +39,7 @@ def board(
 ) -> None:
     """Write the ChArUco board to print."""
     from ..core.files import output_file
-    from ..vision.camera.board import Board
-    from ..vision.camera.board_print import write_board
+    from ..vision import Board, write_board
 
     columns, rows = _two_numbers(squares, "--board")
     output_file(out)
@@ -105,8 +101,8 @@ def calibrate(
 ) -> None:  # fmt: skip
     """Calibrate a camera from photographs of the board."""
     from ..core.files import output_file
-    from ..vision.camera.calibrate import calibrate as calibrate_photos
-    from ..vision.picture.photo import read_photo
+    from ..vision import calibrate as calibrate_photos
+    from ..vision import read_photo, write_calibration
 
     output_file(out)
     if known_length or scale_mm_per_px is not None:
@@ -131,7 +127,7 @@ def calibrate(
             camera_height_mm=camera_height_mm,
             focal_px=focal_px,
         )
-    result.save(out)
+    write_calibration(result, out)
     facts = _calibration_facts(result)
     if json_output:
         print_json({"calibration": str(out), **facts})
@@ -203,9 +199,7 @@ def extract(
 ) -> None:  # fmt: skip
     """Measure the rod's centreline in photographs."""
     from ..core.files import output_file, output_folder
-    from ..vision.batch.figures import figure_kind
-    from ..vision.batch.inputs import list_sources
-    from ..vision.batch.run import extract_files
+    from ..vision import extract_files, figure_kind, list_sources
 
     if figure_steps is not None:
         figure_kind(figure_steps)
@@ -215,7 +209,7 @@ def extract(
         own = run / "calibration.json"
         calibration = own if own.exists() else None
     folder = out or run or Path("measured")
-    settings = _settings(
+    setting = _setting(
         calibration,
         bare,
         {
@@ -236,7 +230,7 @@ def extract(
         result = extract_files(
             images,
             folder,
-            settings=settings,
+            setting=setting,
             overlays=overlays,
             edges=edges,
             workers=workers or _workers(len(sources)),
@@ -245,11 +239,10 @@ def extract(
             progress=report,
         )
     if figure_steps is not None:
-        from ..vision.batch.figures import figure_of_steps
-        from ..vision.batch.inputs import read_source
+        from ..vision import figure_of_steps, read_source
 
         index = next(i for i, frame in enumerate(result.frames) if frame.ok)
-        figure_of_steps(read_source(sources[index]), settings, figure_steps)
+        figure_of_steps(read_source(sources[index]), setting, figure_steps)
     _tell_frames(result, json_output=json_output)
 
 
@@ -279,7 +272,7 @@ def _design(
     columns: int, rows: int, square_mm: float, marker_mm: float, dictionary: str,
     print_scale: float, *, legacy: bool, plain: bool,
 ) -> Board:  # fmt: skip
-    from ..vision.camera.board import Board
+    from ..vision import Board
 
     return Board(
         kind="chessboard" if plain else "charuco",
@@ -301,9 +294,7 @@ def _without_board(
     rod_height_mm: float,
 ) -> Calibration:
     from ..core.checks import positive
-    from ..vision.camera.calibrate import calibrate_known_length
-    from ..vision.camera.calibration import scale_calibration
-    from ..vision.picture.photo import read_photo
+    from ..vision import calibrate_known_length, read_photo, scale_calibration
 
     size_px = read_photo(plane).size_px
     if scale_mm_per_px is not None:
@@ -387,17 +378,16 @@ def _only_run(images: list[Path]) -> Path | None:
     return None
 
 
-def _settings(
+def _setting(
     calibration: Path | None,
     bare: Path | None,
     lengths: dict[str, float | None],
     **others: Any,
-) -> Settings:
+) -> Setting:
     from ..core.checks import finite, positive
-    from ..vision.batch.run import Settings, read_bare
-    from ..vision.camera.calibration import Calibration
+    from ..vision import Setting, read_bare, read_calibration
 
-    known = None if calibration is None else Calibration.load(calibration)
+    known = None if calibration is None else read_calibration(calibration)
     given: dict[str, Any] = {
         name: finite(value, f"--{name.replace('_', '-')}", "mm")
         for name, value in lengths.items()
@@ -408,7 +398,7 @@ def _settings(
     if known is not None:
         given.setdefault("rod_height_mm", known.rod_height_mm)
         _below_the_camera(given["rod_height_mm"], known.camera_height_mm)
-    return Settings(
+    return Setting(
         calibration=known,
         bare=None if bare is None else read_bare(bare),
         **given,

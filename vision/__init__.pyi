@@ -1,3 +1,15 @@
+from .batch.figures import (
+    figure_kind as figure_kind,
+)
+from .batch.figures import (
+    figure_of_steps as figure_of_steps,
+)
+from .batch.inputs import (
+    list_sources as list_sources,
+)
+from .batch.inputs import (
+    read_source as read_source,
+)
 from .batch.overlay import (
     draw_overlay as draw_overlay,
 )
@@ -5,13 +17,10 @@ from .batch.run import (
     BatchResult as BatchResult,
 )
 from .batch.run import (
-    Settings as Settings,
-)
-from .batch.run import (
     extract_files as extract_files,
 )
-from .batch.run import (
-    measure as measure,
+from .batch.tables import (
+    FrameRow as FrameRow,
 )
 from .batch.tables import (
     read_centrelines as read_centrelines,
@@ -40,8 +49,23 @@ from .camera.calibration import (
 from .camera.calibration import (
     specimen_to_px as specimen_to_px,
 )
+from .camera.calibration_file import (
+    read_calibration as read_calibration,
+)
+from .camera.calibration_file import (
+    write_calibration as write_calibration,
+)
+from .extraction.bare import (
+    read_bare as read_bare,
+)
 from .extraction.extract import (
     extract as extract,
+)
+from .extraction.extract import (
+    measure as measure,
+)
+from .extraction.setting import (
+    Setting as Setting,
 )
 from .measurement import (
     Measurement as Measurement,

@@ -25,7 +25,7 @@ from ...core.specimen_file import MagnetModel, SpecimenModel
 from ...rig.bench.config import BenchModel
 from ...rig.runs.read import read_run
 from ...sim import Support
-from ...vision.camera.calibration import Calibration
+from ...vision import Calibration, read_calibration
 from ...vision.measurement import Pose
 
 if TYPE_CHECKING:
@@ -372,7 +372,7 @@ def _calibration(path: Path, warnings: list[str]) -> Calibration | None:
         )
         return None
     try:
-        return Calibration.load(file)
+        return read_calibration(file)
     except ConfigError as error:
         warnings.append(f"calibration.json cannot be used: {error}")
         return None

@@ -21,10 +21,14 @@ from ...rig.clock import Clock, SteppedClock
 from ...rig.link import WireLog
 from ...rig.runs.runner import RunSummary, run
 from ...rig.virtual.bench import open_twin
-from ...vision.batch.run import Settings, extract_files
-from ...vision.camera.calibrate import calibrate
-from ...vision.camera.calibration import Calibration
-from ...vision.picture.photo import read_photo
+from ...vision import (
+    Calibration,
+    Setting,
+    calibrate,
+    extract_files,
+    read_photo,
+    write_calibration,
+)
 from .bench import TwinBench
 
 _SWING = {"swing_mm": 1.0, "swing_Hz": 2.0, "damping_s": 0.4}
@@ -112,19 +116,19 @@ def calibrate_twin(bench: TwinBench, folder: Path) -> Calibration:
     calibration = calibrate(
         read_photo(path), board=bench.board, rod_height_mm=bench.axis_height_mm
     )
-    calibration.save(folder / "calibration.json")
+    write_calibration(calibration, folder / "calibration.json")
     return calibration
 
 
 def measure_twin(bench: TwinBench, folder: Path, calibration: Calibration) -> int:
     """Extract the centrelines of the run in `folder`; return how many there are."""
-    settings = Settings(
+    setting = Setting(
         calibration=calibration,
         rod_height_mm=bench.axis_height_mm,
         joints_mm=bench.specimen.joints_mm,
         length_mm=bench.specimen.length_mm,
     )
-    return extract_files([folder], folder, settings=settings).measured
+    return extract_files([folder], folder, setting=setting).measured
 
 
 def bench_run(folder: Path, *, specimen: Specimen, seed: int) -> None:

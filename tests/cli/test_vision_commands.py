@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from magbend.cli import main as cli
+from magbend.vision import read_calibration, write_calibration
 from magbend.vision.batch.tables import read_centrelines, read_frames, to_centreline
-from magbend.vision.camera.calibration import Calibration
 from magbend.vision.synthetic.score import signed_distance
 
 FIXTURES = Path(__file__).parents[2] / "fixtures" / "vision"
@@ -45,7 +45,7 @@ def calibration(tmp_path_factory) -> Path:
     from magbend.vision.picture.photo import read_photo
 
     path = tmp_path_factory.mktemp("camera") / "calibration.json"
-    calibrate(read_photo(BOARD), board=Board()).save(path)
+    write_calibration(calibrate(read_photo(BOARD), board=Board()), path)
     return path
 
 
@@ -64,7 +64,7 @@ def test_calibrate_tells_and_writes(magbend, tmp_path):
     assert code == 0
     assert "24 corners" in out
     assert "+-" in out
-    camera = Calibration.load(path)
+    camera = read_calibration(path)
     assert camera.rod_height_mm == 0.9
     assert camera.mm_per_px((800.0, 600.0), height_mm=0.0) == pytest.approx(
         0.04879, rel=1e-3
@@ -90,7 +90,7 @@ def test_calibrate_from_a_known_length(magbend, tmp_path):
     )  # fmt: skip
     assert code == 0
     assert "no correction for height" in out
-    scale = Calibration.load(path).mm_per_px((800.0, 600.0), height_mm=0.0)
+    scale = read_calibration(path).mm_per_px((800.0, 600.0), height_mm=0.0)
     assert scale == pytest.approx(60.0 / 1233.0, rel=1e-6)
 
 

@@ -13,13 +13,9 @@ import pytest
 from PIL import Image
 
 from magbend.core.errors import VisionError
+from magbend.vision import Setting, read_bare
 from magbend.vision.batch.overlay import draw_overlay
-from magbend.vision.batch.run import (
-    Settings,
-    _single_threaded_children,
-    extract_files,
-    read_bare,
-)
+from magbend.vision.batch.run import _single_threaded_children, extract_files
 from magbend.vision.batch.tables import read_centrelines, read_frames, to_centreline
 from magbend.vision.camera.calibration import scale_calibration
 from magbend.vision.measurement import POINT_COLUMNS, failure
@@ -30,7 +26,7 @@ from magbend.vision.synthetic.score import signed_distance
 SIZE = (900, 640)
 SCALE = 16.0
 CALIBRATION = scale_calibration(mm_per_px=1.0 / SCALE, image_size_px=SIZE)
-SETTINGS = Settings(calibration=CALIBRATION)
+SETTINGS = Setting(calibration=CALIBRATION)
 
 
 def frame(seed=0, angle=40.0, **options):
@@ -63,7 +59,7 @@ def folder(tmp_path, good):
 
 def test_tables_hold_what_was_measured(tmp_path, folder, good):
     out = tmp_path / "out"
-    result = extract_files([folder], out, settings=SETTINGS)
+    result = extract_files([folder], out, setting=SETTINGS)
     assert [row.image for row in result.frames] == ["a.png", "b.png", "c.png"]
     assert [row.status for row in result.frames] == ["failed", "ok", "ok"]
     assert result.measured == 2
@@ -89,7 +85,7 @@ def test_tables_hold_what_was_measured(tmp_path, folder, good):
 
 def test_tables_without_the_deviations_are_read_as_before(tmp_path, folder):
     out = tmp_path / "out"
-    extract_files([folder], out, settings=SETTINGS, overlays=False)
+    extract_files([folder], out, setting=SETTINGS, overlays=False)
     new = read_centrelines(out / "centrelines.csv")
     old = tmp_path / "old.csv"
     lines = (out / "centrelines.csv").read_text().splitlines()
@@ -99,7 +95,7 @@ def test_tables_without_the_deviations_are_read_as_before(tmp_path, folder):
 
 def test_header_is_the_contract(tmp_path, folder):
     out = tmp_path / "out"
-    extract_files([folder], out, settings=SETTINGS, overlays=False)
+    extract_files([folder], out, setting=SETTINGS, overlays=False)
     assert (out / "centrelines.csv").read_text().splitlines()[0] == (
         "image,s_mm,x_mm,y_mm,theta_rad,kappa_per_mm,width_mm,sigma_mm,x_px,y_px,good,"
         "sigma_theta_rad,sigma_kappa_per_mm,sigma_width_mm"
@@ -113,7 +109,7 @@ def test_header_is_the_contract(tmp_path, folder):
 
 def test_without_calibration_there_are_pixels_only(tmp_path, folder, good):
     out = tmp_path / "out"
-    extract_files([folder / "b.png"], out, settings=Settings(), overlays=False)
+    extract_files([folder / "b.png"], out, setting=Setting(), overlays=False)
     (row,) = read_frames(out / "frames.csv")
     assert row.ok
     assert "uncalibrated" in row.flags
@@ -164,7 +160,7 @@ def test_every_bad_picture_has_a_row_that_says_why(tmp_path, good):
     (bad / "folder.png").mkdir()
     save(bad / "zz_good.png", good.image)
     out = tmp_path / "out"
-    result = extract_files([bad], out, settings=SETTINGS)
+    result = extract_files([bad], out, setting=SETTINGS)
     rows = {row.image: row for row in result.frames}
     assert rows.pop("zz_good.png").ok
     assert set(rows) == {*files, "pipe.png", "gone.png"}
@@ -195,7 +191,7 @@ def test_kinds_of_files_that_cameras_write_are_measured(tmp_path, good):
     save(tmp_path / "plain.bmp", image)
     Image.fromarray(colour[..., ::-1]).convert("CMYK").save(tmp_path / "cmyk.jpg")
     files = sorted(path for path in tmp_path.iterdir())
-    result = extract_files(files, tmp_path / "out", settings=SETTINGS, overlays=False)
+    result = extract_files(files, tmp_path / "out", setting=SETTINGS, overlays=False)
     for row in result.frames:
         assert row.ok, (row.image, row.reason)
         assert row.length_mm == pytest.approx(30.0, abs=0.15), row.image
@@ -220,7 +216,7 @@ def test_scenes_that_cannot_be_told_are_refused(tmp_path, good, case):
     save(tmp_path / "x.png", image)
     out = tmp_path / "out"
     with pytest.raises(VisionError, match="none of the 1 photographs"):
-        extract_files([tmp_path / "x.png"], out, settings=SETTINGS)
+        extract_files([tmp_path / "x.png"], out, setting=SETTINGS)
     (row,) = read_frames(out / "frames.csv")
     assert row.status == "failed"
     assert row.reason
@@ -232,18 +228,18 @@ def test_nothing_to_read_is_one_sentence_and_no_output(tmp_path, name):
     (tmp_path / "empty_folder").mkdir()
     out = tmp_path / "out"
     with pytest.raises(VisionError, match=name):
-        extract_files([tmp_path / name], out, settings=SETTINGS)
+        extract_files([tmp_path / name], out, setting=SETTINGS)
     assert not out.exists()
 
 
 def test_resuming_measures_only_what_is_new(tmp_path, folder, good):
     out = tmp_path / "out"
-    extract_files([folder], out, settings=SETTINGS, overlays=False)
+    extract_files([folder], out, setting=SETTINGS, overlays=False)
     before = (out / "centrelines.csv").read_text()
     save(folder / "d.png", good.image)
     seen = []
     extract_files(
-        [folder], out, settings=SETTINGS, overlays=False, resume=True,
+        [folder], out, setting=SETTINGS, overlays=False, resume=True,
         progress=lambda done, total: seen.append((done, total)),
     )  # fmt: skip
     assert seen == [(3, 4), (4, 4)]
@@ -258,7 +254,7 @@ def test_changed_file_or_setting_is_measured_again(tmp_path, folder, good):
     def run(settings):
         seen = []
         extract_files(
-            [folder], out, settings=settings, overlays=False, resume=True,
+            [folder], out, setting=settings, overlays=False, resume=True,
             progress=lambda done, _total: seen.append(done),
         )  # fmt: skip
         return len(seen) - 1
@@ -267,7 +263,7 @@ def test_changed_file_or_setting_is_measured_again(tmp_path, folder, good):
     assert run(SETTINGS) == 0
     save(folder / "b.png", good.image[:, ::-1])
     assert run(SETTINGS) == 1
-    assert run(Settings(calibration=CALIBRATION, length_mm=30.0)) == 3
+    assert run(Setting(calibration=CALIBRATION, length_mm=30.0)) == 3
     (out / "extract.json").write_text('{"torn')
     assert run(SETTINGS) == 3
 
@@ -280,11 +276,11 @@ def test_interruption_leaves_whole_tables_to_resume(tmp_path, folder):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        extract_files([folder], out, settings=SETTINGS, overlays=False, progress=stop)
+        extract_files([folder], out, setting=SETTINGS, overlays=False, progress=stop)
     assert [row.image for row in read_frames(out / "frames.csv")] == ["a.png", "b.png"]
     seen = []
     result = extract_files(
-        [folder], out, settings=SETTINGS, overlays=False, resume=True,
+        [folder], out, setting=SETTINGS, overlays=False, resume=True,
         progress=lambda done, total: seen.append((done, total)),
     )  # fmt: skip
     assert seen == [(2, 3), (3, 3)]
@@ -297,7 +293,7 @@ def test_run_folder_means_its_images(tmp_path, good):
     (run / "run.json").write_text("{}")
     save(run / "images" / "step_000.png", good.image)
     save(run / "calib.png", good.image)
-    result = extract_files([run], run, settings=SETTINGS)
+    result = extract_files([run], run, setting=SETTINGS)
     assert [row.image for row in result.frames] == ["step_000.png"]
     assert (run / "overlays" / "step_000.png").exists()
 
@@ -307,7 +303,7 @@ def test_same_names_in_two_folders_stay_apart(tmp_path, good):
         (tmp_path / name).mkdir()
         save(tmp_path / name / "x.png", good.image)
     result = extract_files(
-        [tmp_path / "one", tmp_path / "two"], tmp_path / "out", settings=SETTINGS
+        [tmp_path / "one", tmp_path / "two"], tmp_path / "out", setting=SETTINGS
     )
     assert [row.image for row in result.frames] == ["one_x.png", "two_x.png"]
     assert len(list((tmp_path / "out" / "overlays").iterdir())) == 2
@@ -321,7 +317,7 @@ def test_video_frames_are_numbered_and_measured(tmp_path):
         image = frame(angle=angle, clamp_px=(200.0, 520.0), angle_deg=0.0).image
         video.write(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR))
     video.release()
-    result = extract_files([path], tmp_path / "out", settings=SETTINGS)
+    result = extract_files([path], tmp_path / "out", setting=SETTINGS)
     assert [row.image for row in result.frames] == [f"bend_{i:06d}" for i in range(3)]
     found = [row.tip_angle_deg for row in result.frames]
     np.testing.assert_allclose(found, angles, atol=1.0)
@@ -332,7 +328,7 @@ def test_file_that_is_no_video_is_refused(tmp_path):
     path = tmp_path / "x.avi"
     path.write_bytes(b"RIFF" + b"0" * 400)
     with pytest.raises(VisionError, match="cannot be opened"):
-        extract_files([path], tmp_path / "out", settings=SETTINGS)
+        extract_files([path], tmp_path / "out", setting=SETTINGS)
 
 
 def test_a_broken_video_costs_its_row_and_not_the_batch(tmp_path, good):
@@ -340,7 +336,7 @@ def test_a_broken_video_costs_its_row_and_not_the_batch(tmp_path, good):
     broken.write_bytes(b"\0\0\0\x18ftypisom" + b"0" * 400)
     picture = save(tmp_path / "a.png", good.image)
     files = [broken, picture]
-    result = extract_files(files, tmp_path / "out", settings=SETTINGS)
+    result = extract_files(files, tmp_path / "out", setting=SETTINGS)
     first, second = result.frames
     assert (first.image, first.status) == ("cut.mp4", "failed")
     assert "cannot be opened" in first.reason
@@ -353,18 +349,18 @@ def test_bare_frame_divides_the_light_out(tmp_path, good):
     paper = np.clip(225.0 * np.ones_like(good.image) * x ** (1 / 2.2), 0, 255)
     save(tmp_path / "x.png", stained)
     bare = read_bare(save(tmp_path / "bare.png", paper.astype(np.uint8)))
-    settings = Settings(calibration=CALIBRATION, bare=bare)
-    result = extract_files([tmp_path / "x.png"], tmp_path / "out", settings=settings)
+    settings = Setting(calibration=CALIBRATION, bare=bare)
+    result = extract_files([tmp_path / "x.png"], tmp_path / "out", setting=settings)
     np.testing.assert_allclose(
         result.frames[0].tip_mm, good.truth.centreline.tip_mm, atol=0.1
     )
     with pytest.raises(VisionError, match="dark"):
         read_bare(save(tmp_path / "dark.png", np.zeros_like(good.image)))
-    other = Settings(
+    other = Setting(
         bare=read_bare(save(tmp_path / "o.png", np.full((99, 99), 200, np.uint8)))
     )
     with pytest.raises(VisionError, match="differ in size"):
-        extract_files([tmp_path / "x.png"], tmp_path / "out", settings=other)
+        extract_files([tmp_path / "x.png"], tmp_path / "out", setting=other)
 
 
 @pytest.mark.parametrize(
@@ -377,9 +373,9 @@ def test_height_that_cannot_be_corrected_is_flagged(
     calibration = scale_calibration(
         mm_per_px=1.0 / SCALE, image_size_px=SIZE, camera_height_mm=camera_height_mm
     )
-    settings = Settings(calibration=calibration, rod_height_mm=rod_height_mm)
+    settings = Setting(calibration=calibration, rod_height_mm=rod_height_mm)
     (row,) = extract_files(
-        [folder / "b.png"], tmp_path / "out", settings=settings, overlays=False
+        [folder / "b.png"], tmp_path / "out", setting=settings, overlays=False
     ).frames
     assert ("height_doubtful" in row.flags) is doubtful
 
@@ -387,7 +383,7 @@ def test_height_that_cannot_be_corrected_is_flagged(
 def test_edge_points_lie_half_a_width_from_the_axis(tmp_path, folder, good):
     path = tmp_path / "edges.csv"
     extract_files(
-        [folder / "b.png"], tmp_path / "out", settings=SETTINGS, overlays=False,
+        [folder / "b.png"], tmp_path / "out", setting=SETTINGS, overlays=False,
         edges=path,
     )  # fmt: skip
     header, *rows = path.read_text().splitlines()
@@ -405,8 +401,8 @@ def test_edge_points_lie_half_a_width_from_the_axis(tmp_path, folder, good):
 
 
 def test_two_processes_give_the_same_tables(tmp_path, folder):
-    extract_files([folder], tmp_path / "one", settings=SETTINGS)
-    extract_files([folder], tmp_path / "two", settings=SETTINGS, workers=2)
+    extract_files([folder], tmp_path / "one", setting=SETTINGS)
+    extract_files([folder], tmp_path / "two", setting=SETTINGS, workers=2)
     for name in ("frames.csv", "centrelines.csv", "extract.json"):
         one, two = ((tmp_path / d / name).read_text() for d in ("one", "two"))
         assert one == two
@@ -426,7 +422,7 @@ def test_a_dying_worker_does_not_lose_the_batch(tmp_path, folder, monkeypatch):
             pass
 
     monkeypatch.setattr("magbend.vision.batch.run.ProcessPoolExecutor", Dying)
-    result = extract_files([folder], tmp_path / "out", settings=SETTINGS, workers=2)
+    result = extract_files([folder], tmp_path / "out", setting=SETTINGS, workers=2)
     assert [row.status for row in result.frames] == ["failed", "ok", "ok"]
 
 

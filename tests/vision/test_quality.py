@@ -12,7 +12,7 @@ from magbend.vision.camera.calibration import scale_calibration
 from magbend.vision.curve.curve import Curve
 from magbend.vision.extraction.quality import _goes_on, doubts
 from magbend.vision.extraction.refine import refine
-from magbend.vision.extraction.specimen_frame import Setting
+from magbend.vision.extraction.setting import Setting
 from magbend.vision.find.binarise import binarise
 from magbend.vision.find.rod import find_candidates
 from magbend.vision.find.track import start_curve
@@ -48,10 +48,7 @@ def test_root_put_short_of_the_clamp_is_doubted():
 
 def test_direction_that_leaves_the_tip_unsure_is_doubted():
     photo, rod, refined = measured()
-    setting = Setting(
-        calibration=None, rod_height_mm=0.0, joints_mm=(), length_mm=None,
-        clamp_height_mm=None,
-    )  # fmt: skip
+    setting = Setting()
 
     def flags(sd_deg):
         line = Measurement(

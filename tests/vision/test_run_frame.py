@@ -8,13 +8,14 @@ import cv2
 import numpy as np
 import pytest
 
-from magbend.vision.batch.run import Settings, extract_files
+from magbend.vision import Setting
+from magbend.vision.batch.run import extract_files
 from magbend.vision.batch.tables import read_centrelines, read_frames
 from magbend.vision.camera.calibration import scale_calibration
 from magbend.vision.synthetic.frames import CLEAN, curve, draw
 
 SIZE, SCALE, HEADING = (900, 640), 16.0, 5.0
-SETTINGS = Settings(
+SETTINGS = Setting(
     calibration=scale_calibration(mm_per_px=1.0 / SCALE, image_size_px=SIZE)
 )
 BENDS = (3.0, 30.0, 60.0, 90.0)
@@ -51,7 +52,7 @@ def run(frames, tmp_path_factory):
 
 def extracted(run, out, **options):
     result = extract_files(
-        [run], out, settings=SETTINGS, overlays=False, **options
+        [run], out, setting=SETTINGS, overlays=False, **options
     )  # fmt: skip
     return result.frames, read_centrelines(out / "centrelines.csv")
 
@@ -156,7 +157,7 @@ def test_loose_photographs_share_a_clamp_only_when_told(run, tmp_path):
     files = sorted((run / "images").iterdir())
     for told, name in ((None, ""), (True, "photographs")):
         result = extract_files(
-            files, tmp_path / str(told), settings=SETTINGS, overlays=False,
+            files, tmp_path / str(told), setting=SETTINGS, overlays=False,
             shared_clamp=told,
         )  # fmt: skip
         assert {row.shared_clamp for row in result.frames if row.ok} == {name}
@@ -175,6 +176,6 @@ def test_a_clamp_that_moves_is_named_and_nothing_is_shared(frames, tmp_path, mov
 
 
 def test_pixels_have_no_frame_to_share(run, tmp_path):
-    result = extract_files([run], tmp_path, settings=Settings(), overlays=False)
+    result = extract_files([run], tmp_path, setting=Setting(), overlays=False)
     assert result.measured == len(BENDS)
     assert not any(row.shared_clamp for row in result.frames)

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from ...core.errors import InputError, VisionError
 from ...core.files import write_bytes
+from ..extraction.extract import measure
+from ..extraction.setting import Setting
 from ..find.binarise import binarise
 from ..measurement import Measurement
 from ..picture.photo import Photo
 from ..picture.srgb import encode_srgb
-from .run import Settings, measure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,14 +26,14 @@ Array = NDArray[np.float64]
 _AXIS, _LEFT, _RIGHT = "#d9480f", "#1971c2", "#2f9e44"
 
 
-def figure_of_steps(photo: Photo, settings: Settings, path: Path) -> None:
+def figure_of_steps(photo: Photo, setting: Setting, path: Path) -> None:
     """Draw how one photograph is measured, as the paper's figure on bending tests.
 
     Parameters
     ----------
     photo : Photo
         A photograph that can be measured.
-    settings : Settings
+    setting : Setting
         As for `measure`.
     path : Path
         The figure: ``.pdf``, ``.svg`` or ``.png``.
@@ -47,7 +48,7 @@ def figure_of_steps(photo: Photo, settings: Settings, path: Path) -> None:
     from matplotlib.figure import Figure
 
     kind = figure_kind(path)
-    found = measure(photo, settings)
+    found = measure(photo, setting)
     if not found.ok:
         raise VisionError(f"{photo.source}: cannot be measured: {found.reason}")
     figure = Figure(figsize=(9.0, 7.6))
@@ -57,7 +58,7 @@ def figure_of_steps(photo: Photo, settings: Settings, path: Path) -> None:
     )
     window = _window(found, photo.size_px)
     _raw(raw, photo, window)
-    _binarised(black, photo, settings, window)
+    _binarised(black, photo, setting, window)
     _edges(edges, photo, found)
     _centreline(line, found)
     for axes in (raw, black, edges, line):
@@ -119,10 +120,10 @@ def _show(axes: Axes, photo: Photo, window: tuple[int, int, int, int]) -> None:
 
 
 def _binarised(
-    axes: Axes, photo: Photo, settings: Settings, window: tuple[int, int, int, int]
+    axes: Axes, photo: Photo, setting: Setting, window: tuple[int, int, int, int]
 ) -> None:
     _title(axes, "b  binarised (relative to the paper's light)")
-    binary = binarise(photo.grey, invert=settings.invert)
+    binary = binarise(photo.grey, invert=setting.invert)
     left, right, top, bottom = window
     if binary is not None:
         height, width = binary.mask.shape

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import logging
-import math
 import multiprocessing
 import os
 import signal
@@ -14,20 +11,17 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
 
 import cv2
-import numpy as np
 
 from ...core.errors import MagbendError, VisionError
 from ...core.files import output_file, output_folder, write_bytes
 from ...core.progress import Progress, silent
-from ..camera.calibration import Calibration
-from ..extraction.extract import extract
-from ..measurement import Measurement, failure
-from ..picture.photo import Photo, read_photo
+from ..extraction.extract import measure
+from ..extraction.setting import Setting
+from ..measurement import failure
 from . import tables
 from .inputs import Source, digest, list_sources, read_source
 from .overlay import overlay_png
@@ -37,56 +31,6 @@ from .tables import Done
 _log = logging.getLogger(__name__)
 
 _CHUNK = 8
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
-    """How every photograph of a batch is measured; see `extract`.
-
-    Parameters
-    ----------
-    calibration : Calibration or None
-        None measures in pixels only.
-    rod_height_mm : float
-        Height of the rod's axis above the board's plane.
-    invert : bool or None
-        Light rod on dark ground; None looks for itself.
-    joints_mm : tuple of float
-        Arc lengths at which the stiffness jumps.
-    length_mm : float or None
-        Nominal length, to check against.
-    clamp : {"auto", "none"}
-        ``none`` also measures rods that float freely.
-    clamp_height_mm : float or None
-        Height of the clamp's top above the board's plane.
-    bare : Photo or None
-        The same scene without rod and clamp: its light is divided out.
-    """
-
-    calibration: Calibration | None = None
-    rod_height_mm: float = 0.0
-    invert: bool | None = None
-    joints_mm: tuple[float, ...] = ()
-    length_mm: float | None = None
-    clamp: Literal["auto", "none"] = "auto"
-    clamp_height_mm: float | None = None
-    bare: Photo | None = None
-
-    def fingerprint(self) -> str:
-        """Return a digest that changes with everything that changes a result."""
-        data: dict[str, Any] = {
-            "rod_height_mm": self.rod_height_mm,
-            "invert": self.invert,
-            "joints_mm": self.joints_mm,
-            "length_mm": self.length_mm,
-            "clamp": self.clamp,
-            "clamp_height_mm": self.clamp_height_mm,
-        }
-        if self.calibration is not None:
-            data["calibration"] = _plain(asdict(self.calibration))
-        if self.bare is not None:
-            data["bare"] = hashlib.sha256(self.bare.grey.tobytes()).hexdigest()
-        return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,47 +46,11 @@ class BatchResult:
         return sum(frame.ok for frame in self.frames)
 
 
-def measure(photo: Photo, settings: Settings) -> Measurement:
-    """Measure one photograph; a refusal is a value, never an exception.
-
-    Parameters
-    ----------
-    photo : Photo
-        The photograph.
-    settings : Settings
-        Calibration and options.
-    """
-    width, height = photo.size_px
-    if settings.calibration is not None:
-        try:
-            settings.calibration.check_size(width, height)
-        except VisionError as error:
-            return failure("calibration_mismatch", str(error))
-    if settings.bare is not None:
-        if settings.bare.size_px != photo.size_px:
-            return failure(
-                "bare_mismatch",
-                "the bare frame and the photograph differ in size: "
-                f"{settings.bare.size_px} and {photo.size_px} px",
-            )
-        photo = replace(photo, grey=_flattened(photo, settings.bare))
-    return extract(
-        photo,
-        settings.calibration,
-        rod_height_mm=settings.rod_height_mm,
-        invert=settings.invert,
-        joints_mm=settings.joints_mm,
-        length_mm=settings.length_mm,
-        clamp=settings.clamp,
-        clamp_height_mm=settings.clamp_height_mm,
-    )
-
-
 def extract_files(
     paths: Sequence[Path],
     out: Path,
     *,
-    settings: Settings,
+    setting: Setting,
     overlays: bool = True,
     edges: Path | None = None,
     workers: int = 1,
@@ -158,7 +66,7 @@ def extract_files(
         Pictures, folders, runs or videos (see `inputs.list_sources`).
     out : Path
         Folder for the results; it is made.
-    settings : Settings
+    setting : Setting
         Calibration and options.
     overlays : bool
         Whether to draw what was found.
@@ -189,13 +97,13 @@ def extract_files(
     if edges is not None:
         output_file(edges)
     state = State(
-        out, edges, settings.fingerprint(), [source.image for source in sources],
+        out, edges, setting.fingerprint(), [source.image for source in sources],
         _runs(sources, shared_clamp=shared_clamp),
     )  # fmt: skip
     if resume:
         state.load(sources)
     todo = [source for source in sources if source.image not in state.done]
-    task = _Task(settings, out / "overlays" if overlays else None, edges is not None)
+    task = _Task(setting, out / "overlays" if overlays else None, edges is not None)
     progress(len(sources) - len(todo), len(sources))
     try:
         for done in _run(task, todo, workers):
@@ -231,7 +139,7 @@ def _runs(sources: list[Source], *, shared_clamp: bool | None) -> dict[str, str]
 
 @dataclass(frozen=True, slots=True)
 class _Task:
-    settings: Settings
+    setting: Setting
     overlays: Path | None
     edges: bool
 
@@ -241,7 +149,7 @@ class _Task:
         try:
             sha256 = digest(source)
             photo = read_source(source)
-            measurement = measure(photo, self.settings)
+            measurement = measure(photo, self.setting)
         except (MagbendError, OSError) as error:
             measurement = failure("unreadable", str(error))
         if self.overlays is not None and photo is not None:
@@ -251,7 +159,7 @@ class _Task:
             sha256,
             tables.frame_row(source.image, measurement),
             tables.centreline_rows(source.image, measurement),
-            tables.edge_rows(source.image, measurement, self.settings.calibration)
+            tables.edge_rows(source.image, measurement, self.setting.calibration)
             if self.edges
             else "",
         )
@@ -316,38 +224,3 @@ def _run(task: _Task, todo: list[Source], workers: int) -> Iterator[Done]:
             pool.shutdown(cancel_futures=True)
     for source in todo[finished:]:
         yield task(source)
-
-
-def _flattened(photo: Photo, bare: Photo) -> np.ndarray:
-    """Return the light of a photograph divided by that of the bare scene."""
-    smooth = cv2.GaussianBlur(bare.grey, (0, 0), 4.0)
-    typical = float(np.median(smooth))
-    return np.asarray(
-        photo.grey * (typical / np.maximum(smooth, 0.05 * typical)), dtype=np.float32
-    )
-
-
-def read_bare(path: Path) -> Photo:
-    """Read the photograph of the bare scene.
-
-    Raises
-    ------
-    VisionError
-        If it cannot be read or is dark.
-    """
-    photo = read_photo(path)
-    if float(np.median(photo.grey)) < 0.02:
-        raise VisionError(f"{path}: the bare frame must show lit paper; it is dark")
-    return photo
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, float) and not math.isfinite(value):
-        return str(value)
-    return value

@@ -12,12 +12,11 @@ OpenCV writes it. Points are undistorted, whole images never, so nothing is resa
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import ConfigError, InputError, VisionError
+from ...core.errors import InputError, VisionError
 from ..measurement import Pose
 from .projection import Camera, points_to_picture, points_to_plane
 
@@ -187,30 +186,6 @@ class Calibration:
                 f"received {width_px} x {height_px} px: calibrate the camera that took "
                 "them, at the size it takes them"
             )
-
-    def save(self, path: Path) -> None:
-        """Write the calibration as JSON, whole or not at all."""
-        from .calibration_file import save_calibration
-
-        save_calibration(self, path)
-
-    @classmethod
-    def load(cls, path: Path) -> Calibration:
-        """Read a calibration.
-
-        Raises
-        ------
-        ConfigError
-            If the file is missing or does not hold a calibration.
-        """
-        from .calibration_file import load_calibration
-
-        try:
-            return load_calibration(path)
-        except ConfigError:
-            raise
-        except InputError as error:
-            raise ConfigError(f"{path}: {error}") from None
 
 
 def scale_calibration(

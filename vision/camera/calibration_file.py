@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from ...core.errors import ConfigError, InputError
 from ...core.files import write_text
 from ...core.toml import FileModel, read_toml
 from .calibration import Calibration, View
@@ -51,7 +52,7 @@ class CalibrationModel(FileModel):
     views: tuple[ViewModel, ...] = ()
 
 
-def save_calibration(calibration: Calibration, path: Path) -> None:
+def write_calibration(calibration: Calibration, path: Path) -> None:
     """Write `calibration` as JSON, whole or not at all."""
     data = {
         "schema": 1,
@@ -81,17 +82,23 @@ def save_calibration(calibration: Calibration, path: Path) -> None:
     write_text(path, json.dumps(data, indent=2, allow_nan=False) + "\n")
 
 
-def load_calibration(path: Path) -> Calibration:
-    """Read what `save_calibration` wrote.
+def read_calibration(path: Path) -> Calibration:
+    """Read what `write_calibration` wrote.
 
     Raises
     ------
     ConfigError
-        If the file is missing or a key is missing, unknown or impossible.
-    InputError
-        If the numbers do not make a camera.
+        If the file is missing, a key is missing, unknown or impossible, or the numbers
+        do not make a camera.
     """
     model = read_toml(path, CalibrationModel)
+    try:
+        return _calibration(model)
+    except InputError as error:
+        raise ConfigError(f"{path}: {error}") from None
+
+
+def _calibration(model: CalibrationModel) -> Calibration:
     return Calibration(
         image_size_px=model.image_size_px,
         focal_px=model.focal_px,

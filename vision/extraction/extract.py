@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -11,17 +11,18 @@ from numpy.typing import NDArray
 
 from ...core.errors import MagbendError
 from ..camera.calibration import Calibration
-from ..curve.curve import Curve
 from ..edge.state import LostError
 from ..find.binarise import binarise
-from ..find.choose import Clamp, find_rod
+from ..find.choose import find_rod
 from ..find.rod import Candidate
 from ..find.track import Start, start_curve
 from ..measurement import Measurement, failure
 from ..picture.photo import Photo
+from .bare import flattened
 from .quality import doubts, refusal
 from .refine import refine
-from .specimen_frame import Setting, measurement
+from .setting import Setting
+from .specimen_frame import measurement
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -36,17 +37,7 @@ SMOOTH = 0.12
 """Blur for a rough rod, in widths: its two edges do not feel each other yet."""
 
 
-def extract(
-    photo: Photo,
-    calibration: Calibration | None,
-    *,
-    rod_height_mm: float | None = None,
-    invert: bool | None = None,
-    joints_mm: Sequence[float] = (),
-    length_mm: float | None = None,
-    clamp: Clamp = "auto",
-    clamp_height_mm: float | None = None,
-) -> Measurement:
+def extract(photo: Photo, calibration: Calibration | None, **known: Any) -> Measurement:
     """Measure the rod in a photograph, from clamp to tip.
 
     Parameters
@@ -55,19 +46,8 @@ def extract(
         The photograph, in linear light.
     calibration : Calibration or None
         The camera; without it only pixels are given, flagged ``uncalibrated``.
-    rod_height_mm : float, optional
-        Height of the rod's axis above the board's plane; else the calibration's.
-    invert : bool, optional
-        True for a light rod on a dark background; detected when not given.
-    joints_mm : sequence of float
-        Arc lengths of stiffness joints, where the curvature may jump.
-    length_mm : float, optional
-        Nominal free length; a measured length 2 % off is flagged ``length_mismatch``.
-    clamp : {"auto", "none"}
-        ``none`` also measures a rod that floats freely, from one end to the other.
-    clamp_height_mm : float, optional
-        Height of the clamp's top above the board's plane. Needed only where the camera
-        looks over the clamp so that it hides the root (flag ``root_hidden``).
+    **known
+        What else is known: the fields of `Setting`, such as ``rod_height_mm``.
 
     Returns
     -------
@@ -75,17 +55,25 @@ def extract(
         Failed, with flag and reason, where there is nothing to vouch for; never raises
         for what a picture shows.
     """
-    setting = Setting(
-        calibration=calibration,
-        rod_height_mm=_height(calibration, rod_height_mm),
-        joints_mm=tuple(joints_mm),
-        length_mm=length_mm,
-        clamp_height_mm=clamp_height_mm,
-    )
+    return measure(photo, Setting(calibration=calibration, **known))
+
+
+def measure(photo: Photo, setting: Setting) -> Measurement:
+    """Measure one photograph; a refusal is a value, never an exception.
+
+    Parameters
+    ----------
+    photo : Photo
+        The photograph.
+    setting : Setting
+        Calibration, and what else is known.
+    """
     try:
-        if calibration is not None:
-            calibration.check_size(*photo.size_px)
-        return _extract(photo, setting, invert, clamp)
+        if setting.calibration is not None:
+            setting.calibration.check_size(*photo.size_px)
+        if setting.bare is not None:
+            photo = flattened(photo, setting.bare)
+        return _measure(photo, setting)
     except LostError as lost:
         return failure(lost.flag, lost.reason)
     except MagbendError as error:
@@ -94,19 +82,11 @@ def extract(
         return failure("not_measurable", f"the picture cannot be measured ({error})")
 
 
-def _height(calibration: Calibration | None, given: float | None) -> float:
-    if given is not None:
-        return given
-    return 0.0 if calibration is None else calibration.rod_height_mm
-
-
-def _extract(
-    photo: Photo, setting: Setting, invert: bool | None, clamp: Clamp
-) -> Measurement:
-    binary = binarise(photo.grey, invert=invert)
+def _measure(photo: Photo, setting: Setting) -> Measurement:
+    binary = binarise(photo.grey, invert=setting.invert)
     if binary is None:
         return _empty(photo)
-    binary, candidate = find_rod(photo, binary, invert, clamp)
+    binary, candidate = find_rod(photo, binary, setting.invert, setting.clamp)
     sign = -1.0 if binary.inverted else 1.0
     grey, start = photo.grey, _start(photo.grey, candidate, sign)
     if start.rough:
@@ -116,12 +96,8 @@ def _extract(
         soft = _start(grey, candidate, sign, blur)
         start = replace(soft, rough=True, width=start.width)
     calibrated = setting.calibration is not None
-
-    def joints(curve: Curve) -> Sequence[float]:
-        return setting.joints_px(curve)
-
     refined = refine(
-        grey, start, root=candidate.root, sign=sign, joints=joints,
+        grey, start, root=candidate.root, sign=sign, joints=setting.joints_px,
         walls=setting.walls_px if calibrated and not binary.inverted else None,
         face_px=setting.face_px(start.curve),
     )  # fmt: skip

@@ -14,7 +14,8 @@ from ..find.rod import Candidate
 from ..measurement import Measurement
 from ..picture.photo import Photo
 from .refine import Refined
-from .specimen_frame import Setting, root_hidden
+from .setting import Setting
+from .specimen_frame import root_hidden
 
 LENGTH_TOLERANCE = 0.02
 
@@ -66,7 +67,7 @@ def doubts(
     flags: list[str] = []
     if setting.calibration is None:
         flags.append("uncalibrated")
-    elif _scale_sd(setting.calibration, setting.rod_height_mm) > SCALE:
+    elif _scale_sd(setting.calibration, setting.axis_height_mm) > SCALE:
         flags.append("height_doubtful")
     if candidate.root == "border":
         flags.append("clamp_at_border")

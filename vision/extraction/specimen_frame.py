@@ -11,15 +11,12 @@ ends |g.t| a / 2 past the axis' tip, and the clamp's front plane appears shifted
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..camera.calibration import Calibration
-from ..camera.projection import LocalView, local_view
-from ..curve.curve import Curve
+from ..camera.projection import LocalView
 from ..curve.robust import median
 from ..edge.clamp import between
 from ..edge.ends import APART_PX, is_face
@@ -27,6 +24,7 @@ from ..edge.state import LostError
 from ..find.rod import Candidate
 from ..measurement import Measurement, Pose
 from .refine import Refined
+from .setting import UNKNOWN_CLAMP_MM, Setting, arc_mm, silhouette
 
 Array = NDArray[np.float64]
 
@@ -48,59 +46,11 @@ and of the side wall that is seen, alike over so many widths. They turn the dire
 the clamp, from which the whole frame hangs."""
 CLAMP_PLACE_PX = 0.2
 """A clamp whose place is so far off has the direction of another point of the rod."""
-UNKNOWN_CLAMP_MM = 5.0
 HIDDEN_MM = 0.05
-"""A clamp of unknown height may rise so far above the rod's axis; and what part of the
-root it may hide before that is named."""
+"""What part of the root a clamp of unknown height may hide before that is named."""
 
 POINTS = 121
 """Points of a measured centreline."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Setting:
-    """What is known beside the photograph; see `extract`."""
-
-    calibration: Calibration | None
-    rod_height_mm: float
-    joints_mm: tuple[float, ...]
-    length_mm: float | None
-    clamp_height_mm: float | None
-
-    def joints_px(self, curve: Curve) -> Sequence[float]:
-        """Return the joints as arc lengths in px on a curve."""
-        if not self.joints_mm:
-            return ()
-        if self.calibration is None:
-            if self.length_mm is None:
-                return ()
-            scale = curve.s[-1] / self.length_mm
-            return [scale * joint for joint in self.joints_mm]
-        points = self.calibration.to_mm(curve.points, height_mm=self.rod_height_mm)
-        s_mm = _arc(points)
-        return [float(np.interp(joint, s_mm, curve.s)) for joint in self.joints_mm]
-
-    def walls_px(
-        self, points: Array, theta: Array, width_px: float
-    ) -> tuple[Array, Array]:
-        """Return how wide the side walls are seen, positive on the left; see `refine`.
-
-        And the gap below them, alike. Only with a calibration.
-        """
-        if self.calibration is None:
-            return np.zeros(len(points)), np.zeros(len(points))
-        view = _view(self.calibration, points, theta, self)
-        wall = view.rise_across * width_px / _silhouette(view)
-        return wall, view.rise_across * self.rod_height_mm - 0.5 * wall
-
-    def face_px(self, curve: Curve) -> float:
-        """Return how much of a clamp's face may be seen at the root of a curve."""
-        if self.calibration is None:
-            return 0.0
-        ends = curve.points[:1], curve.theta[:1]
-        rise = _view(self.calibration, *ends, self).rise_along[0]
-        height = self.clamp_height_mm or self.rod_height_mm + UNKNOWN_CLAMP_MM
-        return max(0.0, -float(rise) * height)
 
 
 def measurement(
@@ -157,13 +107,13 @@ def _pixel_columns(
 
 def _calibrated(refined: Refined, setting: Setting, camera: Calibration) -> Measurement:
     curve = refined.fit.curve
-    ends = _view(camera, curve.points[[0, -1]], curve.theta[[0, -1]], setting)
-    side_mm = refined.typical_width / float(_silhouette(ends).mean())
+    ends = setting.view(camera, curve.points[[0, -1]], curve.theta[[0, -1]])
+    side_mm = refined.typical_width / float(silhouette(ends).mean())
     last = refined.tip.s - 0.5 * side_mm * abs(float(ends.rise_along[1]))
     first = _root(refined, ends, setting, side_mm)
     s = np.linspace(first, last, 4 * POINTS)
     points, _ = curve.at(s)
-    s_mm = _arc(camera.to_mm(points, height_mm=setting.rod_height_mm))
+    s_mm = arc_mm(camera.to_mm(points, height_mm=setting.axis_height_mm))
     if not np.isfinite(s_mm[-1]):
         raise LostError(
             "calibration_mismatch",
@@ -180,18 +130,18 @@ def _in_frame(
     fit = refined.fit
     grid = fit.curve
     points, theta = grid.at(s)
-    view = _view(camera, points, theta, setting)
+    view = setting.view(camera, points, theta)
     heading = view.heading
     pose = Pose(
         x_mm=float(view.x_mm[0]), y_mm=float(view.y_mm[0]),
-        angle_deg=float(np.degrees(heading[0])), height_mm=setting.rod_height_mm,
+        angle_deg=float(np.degrees(heading[0])), height_mm=setting.axis_height_mm,
     )  # fmt: skip
     own = pose.from_board(np.column_stack([view.x_mm, view.y_mm]))
     # y runs down in the picture: there the heading turns the other way.
     kappa = np.gradient(heading + theta, s_mm[1])
     kappa -= np.interp(s, grid.s, grid.kappa) * view.along
     table = _pixel_columns(refined, s, points, theta)
-    across = _silhouette(view)
+    across = silhouette(view)
     wall = np.abs(view.rise_across) * table["width_px"] / across
     table["sigma_px"] = np.hypot(table["sigma_px"], SIDE_FACE * wall)
     table |= {
@@ -254,7 +204,7 @@ def _root(refined: Refined, ends: LocalView, setting: Setting, side_mm: float) -
     if face is not None:
         seen_at.append(face.s - 0.5 * rise * side_mm)
     if front is not None:
-        seen_at.append(front.s + rise * setting.rod_height_mm)
+        seen_at.append(front.s + rise * setting.axis_height_mm)
     if len(seen_at) == 2 and abs(seen_at[1] - seen_at[0]) > APART_PX:
         apart = seen_at[1] - seen_at[0]
         return seen_at[is_face(apart, setting.face_px(refined.fit.curve))]
@@ -267,7 +217,7 @@ def _hidden_root(refined: Refined, ends: LocalView, setting: Setting) -> float:
     """Return the root where the clamp's top edge hides it: by height, or by length."""
     rise, along = float(ends.rise_along[0]), float(ends.along[0])
     if setting.clamp_height_mm is not None:
-        return -rise * (setting.clamp_height_mm - setting.rod_height_mm)
+        return -rise * (setting.clamp_height_mm - setting.axis_height_mm)
     if setting.length_mm is None:
         return 0.0
     missing = setting.length_mm * along - refined.tip.s
@@ -283,7 +233,7 @@ def root_hidden(refined: Refined, setting: Setting) -> bool:
     if setting.calibration is None:
         return False
     ends = refined.fit.curve.points[:1], refined.fit.curve.theta[:1]
-    at = _view(setting.calibration, *ends, setting)
+    at = setting.view(setting.calibration, *ends)
     hidden = _hidden_px(refined, setting, float(at.rise_along[0]))
     return hidden > HIDDEN_MM * float(at.along[0])
 
@@ -292,20 +242,3 @@ def _hidden_px(refined: Refined, setting: Setting, rise: float) -> float:
     """Return how much of the root a clamp of unknown height may hide."""
     known = setting.clamp_height_mm is not None or setting.length_mm is not None
     return 0.0 if known or refined.clamp is None else max(0.0, rise) * UNKNOWN_CLAMP_MM
-
-
-def _view(
-    camera: Calibration, points: Array, theta: Array, setting: Setting
-) -> LocalView:
-    height = float(setting.rod_height_mm)
-    view: LocalView = local_view(camera.camera, points, theta, height)
-    return view
-
-
-def _silhouette(view: LocalView) -> Array:
-    """Return the pixels between the edges of a rod per mm of its side."""
-    return view.across + np.abs(view.rise_across)
-
-
-def _arc(points: Array) -> Array:
-    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])

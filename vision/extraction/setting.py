@@ -1,0 +1,122 @@
+"""What is known beside a photograph, and what it says of a rod in pixels."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera.calibration import Calibration
+from ..camera.projection import LocalView, local_view
+from ..curve.curve import Curve
+from ..find.choose import Clamp
+from ..picture.photo import Photo
+
+Array = NDArray[np.float64]
+
+UNKNOWN_CLAMP_MM = 5.0
+"""A clamp of unknown height may rise so far above the rod's axis."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setting:
+    """How photographs are measured: what is known beside them.
+
+    Parameters
+    ----------
+    calibration : Calibration or None
+        The camera; None measures in pixels only, flagged ``uncalibrated``.
+    rod_height_mm : float or None
+        Height of the rod's axis above the board's plane; None takes the calibration's.
+    invert : bool or None
+        True for a light rod on a dark background; None looks for itself.
+    joints_mm : tuple of float
+        Arc lengths at which the stiffness jumps, and so the curvature may.
+    length_mm : float or None
+        Nominal free length; a measured length 2 % off is flagged ``length_mismatch``.
+    clamp : {"auto", "none"}
+        ``none`` also measures a rod that floats freely, from one end to the other.
+    clamp_height_mm : float or None
+        Height of the clamp's top above the board's plane. Needed only where the camera
+        looks over the clamp so that it hides the root (flag ``root_hidden``).
+    bare : Photo or None
+        The same scene without rod and clamp: its light is divided out.
+    """
+
+    calibration: Calibration | None = None
+    rod_height_mm: float | None = None
+    invert: bool | None = None
+    joints_mm: tuple[float, ...] = ()
+    length_mm: float | None = None
+    clamp: Clamp = "auto"
+    clamp_height_mm: float | None = None
+    bare: Photo | None = None
+
+    @property
+    def axis_height_mm(self) -> float:
+        """Height of the rod's axis above the board's plane, as far as it is known."""
+        if self.rod_height_mm is not None:
+            return self.rod_height_mm
+        return 0.0 if self.calibration is None else self.calibration.rod_height_mm
+
+    def fingerprint(self) -> str:
+        """Return a digest that changes with everything that changes a result."""
+        data = asdict(replace(self, bare=None))
+        if self.bare is not None:
+            data["bare"] = hashlib.sha256(self.bare.grey.tobytes()).hexdigest()
+        text = json.dumps(data, sort_keys=True, default=np.ndarray.tolist)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    def joints_px(self, curve: Curve) -> Sequence[float]:
+        """Return the joints as arc lengths in px on a curve."""
+        if not self.joints_mm:
+            return ()
+        if self.calibration is None:
+            if self.length_mm is None:
+                return ()
+            scale = curve.s[-1] / self.length_mm
+            return [scale * joint for joint in self.joints_mm]
+        points = self.calibration.to_mm(curve.points, height_mm=self.axis_height_mm)
+        s_mm = arc_mm(points)
+        return [float(np.interp(joint, s_mm, curve.s)) for joint in self.joints_mm]
+
+    def walls_px(
+        self, points: Array, theta: Array, width_px: float
+    ) -> tuple[Array, Array]:
+        """Return how wide the side walls are seen, positive on the left; see `refine`.
+
+        And the gap below them, alike. Only with a calibration.
+        """
+        if self.calibration is None:
+            return np.zeros(len(points)), np.zeros(len(points))
+        view = self.view(self.calibration, points, theta)
+        wall = view.rise_across * width_px / silhouette(view)
+        return wall, view.rise_across * self.axis_height_mm - 0.5 * wall
+
+    def face_px(self, curve: Curve) -> float:
+        """Return how much of a clamp's face may be seen at the root of a curve."""
+        if self.calibration is None:
+            return 0.0
+        ends = curve.points[:1], curve.theta[:1]
+        rise = self.view(self.calibration, *ends).rise_along[0]
+        height = self.clamp_height_mm or self.axis_height_mm + UNKNOWN_CLAMP_MM
+        return max(0.0, -float(rise) * height)
+
+    def view(self, camera: Calibration, points: Array, theta: Array) -> LocalView:
+        """Return how the camera sees the rod's axis at points and angles in px."""
+        seen: LocalView = local_view(camera.camera, points, theta, self.axis_height_mm)
+        return seen
+
+
+def silhouette(view: LocalView) -> Array:
+    """Return the pixels between the edges of a rod per mm of its side."""
+    return view.across + np.abs(view.rise_across)
+
+
+def arc_mm(points: Array) -> Array:
+    """Return the arc length at the points of a polyline."""
+    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
