@@ -8,7 +8,7 @@ cut off is read as far as it goes, and says so in `warnings`.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,8 +25,14 @@ from ...core.specimen_file import MagnetModel, SpecimenModel
 from ...rig.bench.config import BenchModel
 from ...rig.runs.read import read_run
 from ...sim import Support
-from ...vision import Calibration, read_calibration
-from ...vision.measurement import Pose
+from ...vision import (
+    Calibration,
+    FrameRow,
+    Pose,
+    read_calibration,
+    read_centrelines,
+    read_frames,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -379,33 +385,15 @@ def _calibration(path: Path, warnings: list[str]) -> Calibration | None:
 
 
 def _frames(path: Path) -> dict[str, Frame]:
-    import pandas as pd
-
-    tables = {}
     for name in ("frames.csv", "centrelines.csv"):
-        file = path / name
-        try:
-            tables[name] = pd.read_csv(file, dtype={"image": str, "flags": str})
-        except FileNotFoundError:
-            raise StoreError(_how_to_measure(path, name)) from None
-        except (ValueError, OSError) as error:
-            raise StoreError(f"{file}: cannot be read as a table: {error}") from None
-    for name, needed in (
-        ("frames.csv", {"image", "status"}),
-        ("centrelines.csv", {"image", *POINT_COLUMNS[:4]}),
-    ):
-        missing = needed - set(tables[name].columns)
-        if missing:
-            raise StoreError(
-                f"{path / name}: must have the column(s) {', '.join(sorted(missing))}; "
-                "magbend vision extract writes such a table"
-            )
-    groups = dict(list(tables["centrelines.csv"].groupby("image", sort=False)))
-    frames = {}
-    for row in tables["frames.csv"].to_dict("records"):
-        frame = _frame(path, row, groups.get(row["image"]))
-        frames[frame.image] = frame
-    return frames
+        if not (path / name).exists():
+            raise StoreError(_how_to_measure(path, name))
+    try:
+        rows = read_frames(path / "frames.csv")
+        lines = read_centrelines(path / "centrelines.csv")
+    except ConfigError as error:
+        raise StoreError(str(error)) from None
+    return {row.image: _frame(path, row, lines.get(row.image)) for row in rows}
 
 
 def _how_to_measure(path: Path, name: str) -> str:
@@ -422,39 +410,35 @@ def _how_to_measure(path: Path, name: str) -> str:
     )
 
 
-def _frame(path: Path, row: Mapping[Any, Any], table: pd.DataFrame | None) -> Frame:
-    points: dict[str, NDArray[np.float64]] = {}
+def _frame(
+    path: Path, row: FrameRow, points: dict[str, NDArray[np.float64]] | None
+) -> Frame:
     centreline = None
-    status, reason = str(row["status"]), _text(row.get("reason"))
-    if status == "ok" and table is not None:
+    status, reason = row.status, row.reason
+    if row.ok and points is not None:
         try:
-            points = {
-                name: table[name].to_numpy(dtype=np.float64)
-                for name in POINT_COLUMNS
-                if name in table
-            }
             centreline = _centreline(points)
         except (ValueError, InputError) as error:
             raise StoreError(
-                f"{path / 'centrelines.csv'}: the line of {row['image']} cannot be "
+                f"{path / 'centrelines.csv'}: the line of {row.image} cannot be "
                 f"used: {error}"
             ) from None
-    elif status == "ok":
+    elif row.ok:
         status, reason = "failed", "centrelines.csv has no line for this photograph"
-    kept = len(centreline.s_mm) if centreline else 0
-    sigma = points.get("sigma_mm")
+    if not row.ok or points is None:
+        points = {}
     return Frame(
-        image=str(row["image"]),
+        image=row.image,
         status=status,
-        flags=tuple(_text(row.get("flags")).replace(";", " ").split()),
+        flags=row.flags,
         reason=reason,
         points=points,
         centreline=centreline,
-        sigma_mm=_good(points, sigma) if sigma is not None else np.full(kept, np.nan),
-        width_mm=_number(row.get("width_mm")),
-        clamp_angle_sd_deg=_number(row.get("clamp_angle_sd_deg")),
-        pose=_pose(row),
-        shared_clamp=_text(row.get("shared_clamp")),
+        sigma_mm=_good(points, points["sigma_mm"]) if points else np.empty(0),
+        width_mm=row.width_mm,
+        clamp_angle_sd_deg=row.clamp_angle_sd_deg,
+        pose=row.pose,
+        shared_clamp=row.shared_clamp,
     )
 
 
@@ -465,11 +449,11 @@ def _centreline(points: dict[str, NDArray[np.float64]]) -> Centreline | None:
         name: _good(points, points[name])
         for name in ("s_mm", "x_mm", "y_mm", "theta_rad")
     }
-    kappa = points.get("kappa_per_mm")
-    if kappa is None or not np.all(np.isfinite(_good(points, kappa))):
+    kappa = _good(points, points["kappa_per_mm"])
+    if not np.all(np.isfinite(kappa)):
         columns["kappa_per_mm"] = np.gradient(columns["theta_rad"], columns["s_mm"])
     else:
-        columns["kappa_per_mm"] = _good(points, kappa)
+        columns["kappa_per_mm"] = kappa
     return Centreline(**columns)
 
 
@@ -477,29 +461,7 @@ def _good(
     points: dict[str, NDArray[np.float64]], values: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the values at measured points; both ends always stay."""
-    good = points.get("good")
-    if good is None:
-        return values
-    keep = good > 0.0
+    good = points["good"]
+    keep = (good > 0.0) | np.isnan(good)
     keep[[0, -1]] = True
     return np.asarray(values[keep])
-
-
-def _pose(row: Mapping[Any, Any]) -> Pose | None:
-    values = [
-        _number(row.get(name))
-        for name in ("clamp_x_mm", "clamp_y_mm", "clamp_angle_deg")
-    ]
-    if not all(math.isfinite(value) for value in values):
-        return None
-    height = _number(row.get("rod_height_mm"))
-    return Pose(
-        x_mm=values[0],
-        y_mm=values[1],
-        angle_deg=values[2],
-        height_mm=height if math.isfinite(height) else 0.0,
-    )
-
-
-def _text(value: Any) -> str:
-    return value if isinstance(value, str) else ""

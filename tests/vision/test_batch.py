@@ -18,7 +18,7 @@ from magbend.vision.batch.overlay import draw_overlay
 from magbend.vision.batch.run import _single_threaded_children, extract_files
 from magbend.vision.batch.tables import read_centrelines, read_frames, to_centreline
 from magbend.vision.camera.calibration import scale_calibration
-from magbend.vision.measurement import POINT_COLUMNS, failure
+from magbend.vision.measurement import DEVIATION_COLUMNS, POINT_COLUMNS, failure
 from magbend.vision.picture.photo import Photo, read_photo
 from magbend.vision.synthetic.frames import CLEAN, curve, draw
 from magbend.vision.synthetic.score import signed_distance
@@ -73,7 +73,7 @@ def test_tables_hold_what_was_measured(tmp_path, folder, good):
     assert ok.pose is not None
     lines = read_centrelines(out / "centrelines.csv")
     assert set(lines) == {"b.png", "c.png"}  # a refusal has no centreline
-    assert tuple(lines["b.png"]) == POINT_COLUMNS
+    assert tuple(lines["b.png"]) == (*POINT_COLUMNS, *DEVIATION_COLUMNS)
     line = to_centreline(lines["b.png"])
     distance = signed_distance(line.points_mm, good.truth.centreline.points_mm)
     assert np.abs(distance).max() < 0.05
@@ -90,7 +90,11 @@ def test_tables_without_the_deviations_are_read_as_before(tmp_path, folder):
     old = tmp_path / "old.csv"
     lines = (out / "centrelines.csv").read_text().splitlines()
     old.write_text("".join(line.rsplit(",", 3)[0] + "\n" for line in lines))
-    np.testing.assert_equal(read_centrelines(old), new)
+    read = read_centrelines(old)["b.png"]
+    for name in POINT_COLUMNS:
+        np.testing.assert_equal(read[name], new["b.png"][name])
+    for name in DEVIATION_COLUMNS:
+        assert np.all(np.isnan(read[name]))
 
 
 def test_header_is_the_contract(tmp_path, folder):

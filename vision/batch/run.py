@@ -22,11 +22,10 @@ from ...core.progress import Progress, silent
 from ..extraction.extract import measure
 from ..extraction.setting import Setting
 from ..measurement import failure
-from . import tables
 from .inputs import Source, digest, list_sources, read_source
 from .overlay import overlay_png
 from .state import State
-from .tables import Done
+from .tables import Done, FrameRow, done_with
 
 _log = logging.getLogger(__name__)
 
@@ -38,7 +37,7 @@ class BatchResult:
     """Where the tables are, and the row of every photograph in their order."""
 
     out: Path
-    frames: tuple[tables.FrameRow, ...]
+    frames: tuple[FrameRow, ...]
 
     @property
     def measured(self) -> int:
@@ -112,7 +111,7 @@ def extract_files(
     finally:
         # After an interruption too: what is measured can be resumed.
         state.write()
-    frames = tuple(tables.read_frames(out / "frames.csv"))
+    frames = tuple(done.row for done in state.ready())
     if not any(frame.ok for frame in frames):
         first = frames[0]
         raise VisionError(
@@ -154,15 +153,10 @@ class _Task:
             measurement = failure("unreadable", str(error))
         if self.overlays is not None and photo is not None:
             write_bytes(self.overlays / source.overlay, overlay_png(photo, measurement))
-        return Done(
-            source.image,
-            sha256,
-            tables.frame_row(source.image, measurement),
-            tables.centreline_rows(source.image, measurement),
-            tables.edge_rows(source.image, measurement, self.setting.calibration)
-            if self.edges
-            else "",
-        )
+        return done_with(
+            source.image, sha256, measurement, self.setting.calibration,
+            edges=self.edges,
+        )  # fmt: skip
 
 
 _task: _Task | None = None

@@ -1,12 +1,15 @@
-"""``centrelines.csv``, ``frames.csv`` and the edge table: rows out, measurements in."""
+"""``frames.csv``, ``centrelines.csv`` and the edge table: the only place of their text.
+
+Rows stay numbers until they are written, and are numbers again once they are read.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +18,12 @@ from numpy.typing import NDArray
 from ...core.centreline import Centreline
 from ...core.errors import ConfigError
 from ..camera.calibration import Calibration
-from ..measurement import DEVIATION_COLUMNS, POINT_COLUMNS, Measurement, Pose
+from ..measurement import DEVIATION_COLUMNS, NAN2, POINT_COLUMNS, Measurement, Pose
 
 Array = NDArray[np.float64]
 
-CENTRELINE_HEADER = ("image", *POINT_COLUMNS, *DEVIATION_COLUMNS)
+CENTRELINE_COLUMNS = (*POINT_COLUMNS, *DEVIATION_COLUMNS)
+CENTRELINE_HEADER = ("image", *CENTRELINE_COLUMNS)
 FRAME_HEADER = (
     "image", "status", "flags", "length_mm", "tip_x_mm", "tip_y_mm", "tip_angle_deg",
     "width_mm", "clamp_x_px", "clamp_y_px", "tip_x_px", "tip_y_px", "clamp_x_mm",
@@ -27,17 +31,7 @@ FRAME_HEADER = (
     "clamp_angle_sd_deg", "own_angle_deg", "own_angle_sd_deg", "shared_clamp",
 )  # fmt: skip
 EDGE_HEADER = ("image", "side", "point", "x_px", "y_px", "x_mm", "y_mm")
-
-
-@dataclass(frozen=True, slots=True)
-class Done:
-    """The text that one photograph adds to the tables."""
-
-    image: str
-    sha256: str
-    frame: str
-    centreline: str
-    edges: str
+SIDES = ("left", "right")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,15 +45,15 @@ class FrameRow:
 
     image: str
     status: str
-    flags: tuple[str, ...]
-    length_mm: float
-    tip_mm: tuple[float, float]
-    tip_angle_deg: float
-    width_mm: float
-    clamp_px: tuple[float, float]
-    tip_px: tuple[float, float]
-    pose: Pose | None
-    reason: str
+    flags: tuple[str, ...] = ()
+    length_mm: float = math.nan
+    tip_mm: tuple[float, float] = NAN2
+    tip_angle_deg: float = math.nan
+    width_mm: float = math.nan
+    clamp_px: tuple[float, float] = NAN2
+    tip_px: tuple[float, float] = NAN2
+    pose: Pose | None = None
+    reason: str = ""
     clamp_angle_sd_deg: float = math.nan
     own_angle_deg: float = math.nan
     own_angle_sd_deg: float = math.nan
@@ -71,123 +65,122 @@ class FrameRow:
         return self.status == "ok"
 
 
-def frame_row(image: str, measurement: Measurement) -> str:
-    """Return the row of ``frames.csv`` of one photograph, with its line end."""
-    m, pose = measurement, measurement.pose
-    placed = (
-        ("", "", "", "")
-        if pose is None
-        else tuple(
-            number(value)
-            for value in (pose.x_mm, pose.y_mm, pose.angle_deg, pose.height_mm)
-        )
-    )
-    sd = number(m.clamp_angle_sd_deg)
-    return row(
-        image, m.status, ";".join(m.flags), number(m.length_mm), number(m.tip_mm[0]),
-        number(m.tip_mm[1]), number(m.tip_angle_deg), number(m.width_mm),
-        number(m.clamp_px[0]), number(m.clamp_px[1]), number(m.tip_px[0]),
-        number(m.tip_px[1]), *placed, " ".join(m.reason.split()), sd, placed[2], sd, "",
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Done:
+    """What one photograph adds to the tables.
+
+    Parameters
+    ----------
+    row : FrameRow
+        Its row of ``frames.csv``.
+    sha256 : str
+        Digest of the photograph; empty where it could not be read.
+    points : mapping of str to ndarray, shape (n,)
+        `CENTRELINE_COLUMNS`; empty where it failed.
+    edges : ndarray, shape (m, 6)
+        Side (0 left, 1 right), point, x_px, y_px, x_mm and y_mm of the edge table.
+    """
+
+    row: FrameRow
+    sha256: str
+    points: Mapping[str, Array] = field(default_factory=dict)
+    edges: Array = field(default_factory=lambda: np.empty((0, 6)))
+
+
+def done_with(
+    image: str, sha256: str, found: Measurement, calibration: Calibration | None,
+    *, edges: bool,
+) -> Done:  # fmt: skip
+    """Return what a measurement adds to the tables, with or without its edges."""
+    angle = math.nan if found.pose is None else found.pose.angle_deg
+    row = FrameRow(
+        image=image, status=found.status, flags=found.flags, length_mm=found.length_mm,
+        tip_mm=found.tip_mm, tip_angle_deg=found.tip_angle_deg, width_mm=found.width_mm,
+        clamp_px=found.clamp_px, tip_px=found.tip_px, pose=found.pose,
+        reason=" ".join(found.reason.split()),
+        clamp_angle_sd_deg=found.clamp_angle_sd_deg,
+        own_angle_deg=angle, own_angle_sd_deg=found.clamp_angle_sd_deg,
     )  # fmt: skip
+    if not found.ok:
+        return Done(row=row, sha256=sha256)
+    nothing = np.full(len(found.points["good"]), np.nan)
+    points = {name: found.points.get(name, nothing) for name in CENTRELINE_COLUMNS}
+    if not edges:
+        return Done(row=row, sha256=sha256, points=points)
+    sides = edge_points(found, calibration)
+    return Done(row=row, sha256=sha256, points=points, edges=sides)
 
 
-def centreline_rows(image: str, measurement: Measurement) -> str:
-    """Return the rows of ``centrelines.csv`` of one photograph; none if it failed."""
-    if not measurement.ok:
-        return ""
-    nothing = np.full(len(measurement.points["good"]), np.nan)
-    columns = [measurement.points.get(name, nothing) for name in CENTRELINE_HEADER[1:]]
-    name = row(image).rstrip("\n")
-    lines = [
-        f"{name},{','.join(number(value) for value in values)}"
-        for values in zip(*columns, strict=True)
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def edge_rows(
-    image: str, measurement: Measurement, calibration: Calibration | None
-) -> str:
+def edge_points(found: Measurement, calibration: Calibration | None) -> Array:
     """Return the side-edge points of one photograph, as the paper recorded them.
 
     Parameters
     ----------
-    image : str
-        Name for the first column.
-    measurement : Measurement
+    found : Measurement
         Its points must hold the edge columns; without them there are no rows.
     calibration : Calibration or None
         Gives the edges in mm in the specimen frame, at the height of the rod's axis.
+
+    Returns
+    -------
+    ndarray, shape (m, 6)
+        As in `Done`.
     """
-    points, pose = measurement.points, measurement.pose
-    name, lines = row(image).rstrip("\n"), []
-    for side in ("left", "right"):
-        if f"{side}_x_px" not in points:
-            return ""
-        px = np.column_stack([points[f"{side}_x_px"], points[f"{side}_y_px"]])
+    rows = []
+    for number, side in enumerate(SIDES):
+        if f"{side}_x_px" not in found.points:
+            return np.empty((0, 6))
+        columns = [found.points[f"{side}_{axis}_px"] for axis in "xy"]
+        px = np.column_stack(columns)
         mm = np.full_like(px, np.nan)
-        if calibration is not None and pose is not None:
-            mm = pose.from_board(calibration.to_mm(px, height_mm=pose.height_mm))
-        for index, values in enumerate(np.column_stack([px, mm])):
-            if np.all(np.isfinite(values[:2])):
-                cells = ",".join(number(value) for value in values)
-                lines.append(f"{name},{side},{index},{cells}\n")
-    return "".join(lines)
+        if calibration is not None and found.pose is not None:
+            height = found.pose.height_mm
+            mm = found.pose.from_board(calibration.to_mm(px, height_mm=height))
+        count = np.arange(len(px))
+        rows.append(np.column_stack([np.full(len(px), number), count, px, mm]))
+    table = np.concatenate(rows)
+    return np.asarray(table[np.all(np.isfinite(table[:, 2:4]), axis=1)])
 
 
-def number(value: float) -> str:
-    """Return a number with ten digits; empty where there is none."""
-    return f"{value:.10g}" if math.isfinite(value) else ""
+def write_frames(rows: Iterable[FrameRow]) -> str:
+    """Return the text of a ``frames.csv``."""
+    return _table(FRAME_HEADER, (_frame_cells(row) for row in rows))
 
 
-def row(*cells: str) -> str:
-    """Return one line of a table, with its end."""
-    buffer = io.StringIO()
-    csv.writer(buffer, lineterminator="\n").writerow(cells)
-    return buffer.getvalue()
+def write_centrelines(done: Iterable[Done]) -> str:
+    """Return the text of a ``centrelines.csv``."""
+    lines = (
+        [each.row.image, *map(_cell, values)]
+        for each in done
+        if each.points
+        for values in zip(
+            *(each.points[name] for name in CENTRELINE_COLUMNS), strict=True
+        )
+    )
+    return _table(CENTRELINE_HEADER, lines)
 
 
-def turned(table: str, header: tuple[str, ...], turn_rad: float) -> str:
-    """Return lines of a table in a specimen frame that is turned about its origin.
-
-    Parameters
-    ----------
-    table : str
-        Lines of ``centrelines.csv`` or of the edge table, without the header.
-    header : tuple of str
-        Their columns.
-    turn_rad : float
-        How far the new frame is turned, counter-clockwise.
-    """
-    x, y = header.index("x_mm"), header.index("y_mm")
-    theta = header.index("theta_rad") if "theta_rad" in header else None
-    c, s = math.cos(turn_rad), math.sin(turn_rad)
-    lines = []
-    for cells in csv.reader(io.StringIO(table)):
-        if cells[x]:
-            old_x, old_y = float(cells[x]), float(cells[y])
-            cells[x] = number(c * old_x + s * old_y)
-            cells[y] = number(c * old_y - s * old_x)
-            if theta is not None:
-                cells[theta] = number(float(cells[theta]) - turn_rad)
-        lines.append(row(*cells))
-    return "".join(lines)
-
-
-def header(names: Iterable[str]) -> str:
-    """Return the first line of a table."""
-    return ",".join(names) + "\n"
+def write_edges(done: Iterable[Done]) -> str:
+    """Return the text of an edge table."""
+    lines = (
+        [each.row.image, SIDES[int(values[0])], *map(_cell, values[1:])]
+        for each in done
+        for values in each.edges
+    )
+    return _table(EDGE_HEADER, lines)
 
 
 def read_frames(path: Path) -> list[FrameRow]:
-    """Read a ``frames.csv``.
+    """Read a ``frames.csv``; columns that it lacks are NaN or empty.
 
     Raises
     ------
     ConfigError
-        If the file is missing, lacks a column or holds something else than numbers.
+        If the file is missing, is no table, lacks image or status, or holds something
+        else than numbers.
     """
-    return [_frame(path, cells) for cells in _rows(path, FRAME_HEADER[:12])]
+    names, lines = _read(path, ("image", "status"))
+    return [_frame(path, dict(zip(names, cells, strict=False))) for cells in lines]
 
 
 def read_centrelines(path: Path) -> dict[str, dict[str, Array]]:
@@ -196,21 +189,31 @@ def read_centrelines(path: Path) -> dict[str, dict[str, Array]]:
     Returns
     -------
     dict of str to dict of str to ndarray, shape (n,)
-        The columns `POINT_COLUMNS` of each image; NaN where a cell is empty.
+        `CENTRELINE_COLUMNS` of each image; NaN where a cell is empty, or the file has
+        no such column.
 
     Raises
     ------
     ConfigError
-        If the file is missing, lacks a column or holds something else than numbers.
+        If the file is missing, is no table, lacks image, s_mm, x_mm, y_mm or theta_rad,
+        or holds something else than numbers.
     """
-    cells: dict[str, list[list[float]]] = {}
-    for line in _rows(path, ("image", *POINT_COLUMNS)):
-        values = [_float(path, line, name) for name in POINT_COLUMNS]
-        cells.setdefault(line["image"], []).append(values)
-    return {
-        image: dict(zip(POINT_COLUMNS, np.array(values).T, strict=True))
-        for image, values in cells.items()
-    }
+    names, lines = _read(path, CENTRELINE_HEADER[:5])
+    known = [name for name in CENTRELINE_COLUMNS if name in names]
+    found = {}
+    for image, values in _by_image(path, names, lines, known).items():
+        columns = dict.fromkeys(CENTRELINE_COLUMNS, np.full(len(values), np.nan))
+        found[image] = columns | dict(zip(known, values.T, strict=True))
+    return found
+
+
+def read_edges(path: Path) -> dict[str, Array]:
+    """Read an edge table: by image, as in `Done`."""
+    names, lines = _read(path, EDGE_HEADER)
+    side = names.index("side")
+    for cells in lines:
+        cells[side] = str(SIDES.index(cells[side])) if cells[side] in SIDES else "?"
+    return _by_image(path, names, lines, EDGE_HEADER[1:])
 
 
 def to_centreline(columns: Mapping[str, Array]) -> Centreline:
@@ -230,53 +233,108 @@ def to_centreline(columns: Mapping[str, Array]) -> Centreline:
     )
 
 
-def _rows(path: Path, needed: Iterable[str]) -> list[dict[str, str]]:
-    from ...core.toml import read_text  # loads pydantic, not needed to write
+def _frame_cells(row: FrameRow) -> list[str]:
+    pose = row.pose
+    placed = (
+        NAN2 * 2
+        if pose is None
+        else (pose.x_mm, pose.y_mm, pose.angle_deg, pose.height_mm)
+    )
+    sizes = (
+        row.length_mm, *row.tip_mm, row.tip_angle_deg, row.width_mm, *row.clamp_px,
+        *row.tip_px, *placed,
+    )  # fmt: skip
+    angles = row.clamp_angle_sd_deg, row.own_angle_deg, row.own_angle_sd_deg
+    return [
+        row.image, row.status, ";".join(row.flags), *map(_cell, sizes), row.reason,
+        *map(_cell, angles), row.shared_clamp,
+    ]  # fmt: skip
 
-    reader = csv.DictReader(io.StringIO(read_text(path)))
-    missing = [name for name in needed if name not in (reader.fieldnames or ())]
-    if missing:
-        raise ConfigError(f"{path}: the column {missing[0]} is missing")
-    return list(reader)
 
-
-def _frame(path: Path, cells: dict[str, str]) -> FrameRow:
+def _frame(path: Path, cells: Mapping[str, str]) -> FrameRow:
     def value(name: str) -> float:
-        return _float(path, cells, name)
+        return _number(path, name, cells.get(name, ""))
+
+    def pair(name: str, unit: str) -> tuple[float, float]:
+        return value(f"{name}_x_{unit}"), value(f"{name}_y_{unit}")
 
     pose = None
-    if cells.get("clamp_angle_deg"):
-        pose = Pose(
-            x_mm=value("clamp_x_mm"),
-            y_mm=value("clamp_y_mm"),
-            angle_deg=value("clamp_angle_deg"),
-            height_mm=value("rod_height_mm"),
-        )
+    if math.isfinite(angle := value("clamp_angle_deg")):
+        x_mm, y_mm = pair("clamp", "mm")
+        height_mm = value("rod_height_mm")
+        height_mm = height_mm if math.isfinite(height_mm) else 0.0
+        pose = Pose(x_mm=x_mm, y_mm=y_mm, angle_deg=angle, height_mm=height_mm)
     return FrameRow(
         image=cells["image"],
         status=cells["status"],
-        flags=tuple(flag for flag in cells["flags"].split(";") if flag),
+        flags=tuple(cells.get("flags", "").replace(";", " ").split()),
         length_mm=value("length_mm"),
-        tip_mm=(value("tip_x_mm"), value("tip_y_mm")),
+        tip_mm=pair("tip", "mm"),
         tip_angle_deg=value("tip_angle_deg"),
         width_mm=value("width_mm"),
-        clamp_px=(value("clamp_x_px"), value("clamp_y_px")),
-        tip_px=(value("tip_x_px"), value("tip_y_px")),
+        clamp_px=pair("clamp", "px"),
+        tip_px=pair("tip", "px"),
         pose=pose,
-        reason=cells.get("reason") or "",
+        reason=cells.get("reason", ""),
         clamp_angle_sd_deg=value("clamp_angle_sd_deg"),
         own_angle_deg=value("own_angle_deg"),
         own_angle_sd_deg=value("own_angle_sd_deg"),
-        shared_clamp=cells.get("shared_clamp") or "",
+        shared_clamp=cells.get("shared_clamp", ""),
     )
 
 
-def _float(path: Path, cells: dict[str, str], name: str) -> float:
-    text = cells.get(name) or ""
-    if not text:
-        return math.nan
+def _cell(value: float) -> str:
+    """Return a number with ten digits; empty where there is none."""
+    return f"{value:.10g}" if math.isfinite(value) else ""
+
+
+def _table(header: Iterable[str], lines: Iterable[Sequence[str]]) -> str:
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(lines)
+    return buffer.getvalue()
+
+
+def _read(path: Path, needed: Iterable[str]) -> tuple[list[str], list[list[str]]]:
+    """Return the names of a table's columns and its rows, as text."""
+    from ...core.toml import read_text  # loads pydantic, not needed to write
+
+    lines = _lines(read_text(path))
+    names = next(lines, [])
+    missing = [name for name in needed if name not in names]
+    if missing:
+        raise ConfigError(
+            f"{path}: must have the column {missing[0]}; magbend vision extract "
+            "writes such a table"
+        )
+    return names, [cells for cells in lines if cells]
+
+
+def _lines(text: str) -> Iterator[list[str]]:
+    return csv.reader(io.StringIO(text))
+
+
+def _by_image(
+    path: Path, names: Sequence[str], lines: Iterable[Sequence[str]],
+    wanted: Sequence[str],
+) -> dict[str, Array]:  # fmt: skip
+    """Return the wanted columns of each image, shape (n, len(wanted))."""
+    image, places = names.index("image"), [names.index(name) for name in wanted]
+    cells: dict[str, list[list[str]]] = {}
+    for line in lines:
+        if len(line) < len(names):
+            raise ConfigError(f"{path}: a row has {len(line)} of {len(names)} columns")
+        cells.setdefault(line[image], []).append([line[k] or "nan" for k in places])
     try:
-        return float(text)
+        return {name: np.array(rows, np.float64) for name, rows in cells.items()}
+    except ValueError as error:
+        raise ConfigError(f"{path}: must hold numbers; instead {error}") from None
+
+
+def _number(path: Path, name: str, text: str) -> float:
+    try:
+        return float(text or "nan")
     except ValueError:
         raise ConfigError(
             f"{path}: column {name} must hold numbers; instead received {text!r}"
