@@ -38,7 +38,8 @@ def magnet(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Fit a magnet's remanence to readings on its axis, and judge each reading."""
-    from ..sim.magnet.fit import fit_magnet, paper_readings, read_readings
+    from ..sim.magnet.fit import fit_magnet
+    from ..sim.magnet.readings import paper_readings, read_readings
 
     sides = sides_mm or (side_mm, side_mm, side_mm)
     printed: list[dict[str, float]] = []

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..core.centreline import Centreline
 from ..core.checks import shown, whole
-from ..core.errors import InputError, SolverError
+from ..core.errors import InputError
 from ..core.specimen import Specimen
 from ..core.units import mT_from_T, rad_from_deg
 from .fields import (
@@ -23,7 +23,7 @@ from .fields import (
     UniformField,
     check_case,
 )
-from .planar.solver import GONE, ORDER, STEP, TOO_STRONG, TOUCHES, solve_planar
+from .planar.solver import GONE, ORDER, STEP, failure, solve_planar
 from .planar.swing import swing_index
 from .scaling import MOST_POINTS, field_array, rod_array, stations, stiffness_Nmm2
 
@@ -141,26 +141,3 @@ def _held(specimen: Specimen, support: Support) -> tuple[Array, float, float, fl
     length_mm = specimen.length_mm
     margin = 0.5 * max(specimen.sides_mm) / length_mm
     return rod, length_mm, margin, stiffness_Nmm2(specimen)[0] / length_mm * 1e-3
-
-
-def failure(
-    outcome: int, specimen: Specimen, field: Field, load: float
-) -> InputError | SolverError:
-    """Return the error that says why the kernel gave no answer."""
-    if outcome == TOUCHES:
-        gap_mm = getattr(field, "gap_mm", float("nan"))
-        return InputError(
-            f"gap_mm must leave the undeformed rod {specimen.name!r} clear of the "
-            f"magnet, with half its side to spare; instead received {gap_mm:g} mm"
-        )
-    if outcome == TOO_STRONG:
-        return InputError(
-            "the load on the rod (flux_mT, remanence_mT, weight) must be less than "
-            "1600 times its stiffness EI / L^2, or 40000 times in a uniform field "
-            "without weight; instead received one beyond it: check E_MPa, side_mm and "
-            "flux_mT"
-        )
-    return SolverError(
-        f"no equilibrium of {specimen.name!r} could be followed beyond "
-        f"{load:.3g} of its load; try a smaller flux_mT or a larger gap_mm"
-    )

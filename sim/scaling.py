@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 
 from ..core.checks import whole
 from ..core.errors import InputError
+from ..core.jit import njit
+from ..core.magnet import Magnet
 from ..core.specimen import Specimen
-from ..core.units import MU0, T_from_mT, rad_from_deg
+from ..core.units import MU0, T_from_mT
 from .fields import FLUX_LIMIT_T, Field, MagnetField, Support, UniformField
-from .magnet.field import BLOCK_SIZE, magnet_block
-from .planar.march import CUBOID, UNIFORM
+from .magnet.field import magnet_block
+from .magnet.flux import CUBOID, UNIFORM, WIDTH
+from .planar.march import WX, WY, E, H, M
 
 Array = NDArray[np.float64]
 P = ParamSpec("P")
@@ -97,6 +100,14 @@ def rod_array(specimen: Specimen, support: Support) -> Array:
     return rod
 
 
+def loads_per_unit(specimen: Specimen) -> tuple[Array, Array]:
+    """Return m per mT of remanence and weight per (kg/m3 m/s2), tip first."""
+    length_mm = specimen.length_mm
+    per_N = length_mm**2 / stiffness_Nmm2(specimen)[0]
+    area = np.array(specimen.sides_mm)[::-1] ** 2
+    return area * 1e-9 / MU0 * per_N, area * length_mm * 1e-9 * per_N
+
+
 def checked_density(specimen: Specimen, support: Support) -> float:
     """Return the density where weight acts, 0 where it does not.
 
@@ -118,15 +129,10 @@ def checked_density(specimen: Specimen, support: Support) -> float:
 @array_cache(maxsize=1024)
 def field_array(field: Field, length_mm: float) -> Array:
     """Return the field as the kernels take it (see `planar.march`)."""
-    out = np.zeros(1 + BLOCK_SIZE)
+    out = np.zeros(WIDTH)
     if isinstance(field, UniformField):
-        angle = rad_from_deg(field.angle_deg)
-        quarter, rest = divmod(field.angle_deg, 90.0)
         out[0] = UNIFORM
-        if rest == 0.0:  # exact zeros for the directions along the axes
-            out[1:3] = ((1, 0), (0, 1), (-1, 0), (0, -1))[int(quarter) % 4]
-        else:
-            out[1:3] = np.cos(angle), np.sin(angle)
+        out[1:3] = direction(np.array(field.angle_deg))
         out[1:3] *= T_from_mT(field.flux_mT)
     elif isinstance(field, MagnetField):
         out[0] = CUBOID
@@ -139,6 +145,101 @@ def field_array(field: Field, length_mm: float) -> Array:
             f"received {type(field).__name__}"
         )
     return out
+
+
+def direction(angle_deg: Array) -> tuple[Array, Array]:
+    """Return cosine and sine of angles in degrees, with exact zeros at right angles.
+
+    Rounding would make a straight rod bend there.
+    """
+    angle = np.radians(angle_deg)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    right = np.mod(angle_deg, 90.0) == 0.0
+    if np.any(right):
+        cosine = np.where(right, np.rint(cosine), cosine)
+        sine = np.where(right, np.rint(sine), sine)
+    return cosine, sine
+
+
+def many_uniform_fields(flux_T: Array, angle_deg: Array) -> Array:
+    """Return uniform fields as the kernels take them, shape (n, 17)."""
+    fields = np.zeros((len(flux_T), WIDTH))
+    cosine, sine = direction(angle_deg)
+    fields[:, 1] = flux_T * cosine
+    fields[:, 2] = flux_T * sine
+    return fields
+
+
+def many_magnet_fields(magnet: Magnet, gap_mm: Array, length_mm: Array) -> Array:
+    """Return one magnet before many rods as the kernels take it, shape (n, 17)."""
+    fields = np.empty((len(gap_mm), WIDTH))
+    fields[:, 0] = CUBOID
+    fields[:, 1:] = magnet_block(magnet, length_mm=0.0, gap_mm=0.0)
+    fields[:, 4:7] -= gap_mm[:, None] * np.array(magnet.axes()[2])
+    fields[:, 4] += length_mm
+    fields[:, 1:7] /= length_mm[:, None]
+    return fields
+
+
+def many_rods(
+    length_mm: Array, E_MPa: Array, side_mm: Array, remanence_mT: Array
+) -> tuple[Array, Array, Array]:
+    """Return many weightless rods as the kernels take them.
+
+    Parameters
+    ----------
+    length_mm, E_MPa, side_mm, remanence_mT : ndarray, shape (n, sections)
+        Root first.
+
+    Returns
+    -------
+    rods : ndarray, shape (n, sections, 5)
+        Tip first (see `planar.march`).
+    total_mm, margins : ndarray, shape (n,)
+        Lengths, and half the largest side over the length.
+
+    Raises
+    ------
+    InputError
+        If a load overflows.
+    """
+    rods = np.empty((*length_mm.shape, 5))
+    total_mm, margins = np.empty(len(length_mm)), np.empty(len(length_mm))
+    given = length_mm, E_MPa, side_mm, remanence_mT
+    if not _pack(*given, 1e-9 / MU0, rods, total_mm, margins):
+        raise InputError(
+            "designs: length_mm, side_mm in mm and E_MPa in MPa must be of comparable "
+            "size; instead received a design whose loads overflow"
+        )
+    return rods, total_mm, margins
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _pack(length, modulus, side, remanence, moment, rods, total, margin):  # type: ignore[no-untyped-def]
+    """Fill `rods` from columns of shape (n, sections), root first.
+
+    `moment` is that of 1 mm2 and 1 mT, in A m. Return whether all is finite.
+    """
+    n, sections = length.shape
+    nothing = 0.0
+    for i in range(n):
+        total[i] = 0.0
+        widest = 0.0
+        for k in range(sections):
+            total[i] += length[i, k]
+            widest = max(widest, side[i, k])
+        margin[i] = widest / (2.0 * total[i])
+        EI = modulus[i, 0] * side[i, 0] ** 4 / 12.0
+        per_N = total[i] * total[i] / EI
+        for k in range(sections):
+            row = rods[i, sections - 1 - k]
+            area = side[i, k] * side[i, k]
+            row[H] = length[i, k] / total[i]
+            row[E] = EI / (modulus[i, k] * area * area / 12.0)
+            row[M] = area * remanence[i, k] * moment * per_N
+            row[WX] = row[WY] = 0.0
+            nothing += 0.0 * (row[H] + row[E] + row[M])
+    return nothing == 0.0
 
 
 @array_cache(maxsize=64)

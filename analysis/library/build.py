@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 from ...core.errors import MissingExtraError, StoreError
 from ...core.files import output_folder, write_bytes, write_text
 from ...core.progress import Progress, silent
-from ...sim.batch.shapes import ROWS_PER_CALL, STATUS, Designs, cores, solve_shapes
+from ...sim.batch import ROWS_PER_CALL, cores
+from ...sim.batch.shapes import STATUS, Designs, solve_shapes
 from ..shapes import descriptors
 from .space import Space
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.jit import njit
-from ...sim.batch.shapes import in_threads
+from ...sim.batch import ROWS_PER_CALL, in_threads
 
 Array = NDArray[np.float64]
 
@@ -43,7 +43,9 @@ def describe(shapes: Array) -> Array:
     """
     out = np.empty((len(shapes), len(COLUMNS)))
     shapes = np.ascontiguousarray(shapes, dtype=np.float64)
-    in_threads(_describe, shapes, out)
+    in_threads(
+        lambda rows: _describe(shapes[rows], out[rows]), len(shapes), ROWS_PER_CALL
+    )
     return out
 
 

@@ -1,4 +1,7 @@
 from .shapes import (
+    ROWS_PER_CALL as ROWS_PER_CALL,
+)
+from .shapes import (
     STATUS as STATUS,
 )
 from .shapes import (
@@ -12,6 +15,12 @@ from .shapes import (
 )
 from .shapes import (
     solve_shapes as solve_shapes,
+)
+from .threads import (
+    cores as cores,
+)
+from .threads import (
+    in_threads as in_threads,
 )
 from .tips import (
     OUTCOMES as OUTCOMES,

@@ -7,9 +7,6 @@ comparing with one bench.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,11 +16,15 @@ from ...core.checks import finite, shown, store, whole
 from ...core.errors import InputError
 from ...core.magnet import Magnet
 from ...core.specimen import Specimen
-from ...core.units import MU0
-from ..magnet.field import magnet_block
 from ..planar.solver import GONE, OK_UNSTABLE, TOUCHES, solve_planar_rows
-from ..scaling import MOST_POINTS
+from ..scaling import (
+    MOST_POINTS,
+    many_magnet_fields,
+    many_rods,
+    many_uniform_fields,
+)
 from .columns import COLUMNS, check_magnet, column
+from .threads import in_threads
 
 Array = NDArray[np.float64]
 
@@ -32,7 +33,6 @@ STATUS = ("stable", "unstable", "pulled in: no equilibrium", "not solved")
 
 ORDER = 10
 STEP = 0.6
-_FIELD = 17
 ROWS_PER_CALL = 512
 """Designs that one thread solves at a time; their shapes fit its cache."""
 
@@ -180,15 +180,12 @@ def solve_shapes(
         raise InputError(f"designs must be Designs; instead received {shown(designs)}")
     points = whole(points, 2, MOST_POINTS, "points")
     n, k = designs.length_mm.shape
-    total_mm = designs.length_mm.sum(axis=1)
-    side_m = designs.side_mm * 1e-3
-    EI = designs.E_MPa * 1e6 * side_m[:, None] ** 4 / 12.0
-    m = designs.remanence_mT * 1e-3 * side_m**2 / MU0
-    rods = np.zeros((n, k, 5))
-    rods[:, :, 0] = (designs.length_mm / total_mm[:, None])[:, ::-1]
-    rods[:, :, 1] = (EI[:, -1:] / EI)[:, ::-1]
-    rods[:, :, 2] = (m * (total_mm * 1e-3) ** 2 / EI[:, -1])[:, None]
-    margins = designs.side_mm / (2.0 * total_mm)
+    rods, total_mm, margins = many_rods(
+        designs.length_mm,
+        designs.E_MPa,
+        np.repeat(designs.side_mm[:, None], k, axis=1),
+        np.repeat(designs.remanence_mT[:, None], k, axis=1),
+    )
     out = np.empty((n, points, 5))
     status = np.empty(n, dtype=np.int8)
     error = np.empty(n)
@@ -196,8 +193,12 @@ def solve_shapes(
     if by_section:
         stations = _section_stations(rods[:, ::-1, 0], points)
     stations = np.broadcast_to(stations, (n, points))
-    fields = _fields(designs, total_mm)
-    in_threads(_solve, stations, rods, fields, total_mm, margins, out, status, error)
+    if designs.magnet is not None and designs.gap_mm is not None:
+        fields = many_magnet_fields(designs.magnet, designs.gap_mm, total_mm)
+    elif designs.flux_mT is not None:
+        fields = many_uniform_fields(designs.flux_mT * 1e-3, designs.angle_deg)
+    columns = stations, rods, fields, total_mm, margins, out, status, error
+    in_threads(lambda rows: _solve(*(c[rows] for c in columns)), n, ROWS_PER_CALL)
     return Shapes(points=out, status=status, error_mm=error)
 
 
@@ -216,57 +217,6 @@ def _section_stations(share: Array, points: int) -> Array:
     stations = np.concatenate([np.zeros((n, 1)), s.reshape(n, -1)], axis=1)
     stations[:, -1] = 1.0
     return stations
-
-
-def in_threads(kernel: Callable[..., None], *rows: NDArray) -> None:
-    """Call ``kernel(*slices)`` on slices of rows, on all cores.
-
-    The kernel must release the interpreter (``nogil``). Threads rather than numba's
-    parallel layer: that one compiles four times as long, aborts on concurrent calls
-    where it falls back, and does not survive a fork.
-    """
-    n = len(rows[0])
-    starts = range(0, n, ROWS_PER_CALL)
-
-    def call(start: int) -> None:
-        kernel(*(array[start : start + ROWS_PER_CALL] for array in rows))
-
-    if len(starts) <= 1:
-        for start in starts:
-            call(start)
-        return
-    with ThreadPoolExecutor(cores()) as pool:
-        for _ in pool.map(call, starts):
-            pass
-
-
-def cores() -> int:
-    """Return how many cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-def _fields(designs: Designs, total_mm: Array) -> Array:
-    fields = np.zeros((len(designs), _FIELD))
-    if designs.flux_mT is not None:
-        angle = np.radians(designs.angle_deg)
-        # Exact at the right angles, where rounding would make a straight rod bend.
-        fields[:, 1] = designs.flux_mT * 1e-3 * np.cos(angle)
-        fields[:, 2] = designs.flux_mT * 1e-3 * np.sin(angle)
-        fields[designs.angle_deg % 180.0 == 90.0, 1] = 0.0
-        fields[designs.angle_deg % 180.0 == 0.0, 2] = 0.0
-        return fields
-    if designs.magnet is None or designs.gap_mm is None:
-        raise InputError("designs must have either flux_mT, or a magnet and gap_mm")
-    fields[:, 0] = 1.0
-    block = magnet_block(designs.magnet, length_mm=0.0, gap_mm=0.0)
-    axis = np.array(designs.magnet.axes()[2])
-    fields[:, 1:] = block
-    fields[:, 4:7] -= designs.gap_mm[:, None] * axis
-    fields[:, 4] += total_mm
-    fields[:, 1:7] /= total_mm[:, None]
-    return fields
 
 
 def _solve(

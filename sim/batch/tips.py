@@ -1,34 +1,28 @@
 """`solve_many`: the tips of many designs at once, on all cores.
 
 Designs run in lanes (`batch.lanes`), and those that leave the lanes through the scalar
-solver, in chunks that a pool of threads takes one by one. Threads rather than numba's
-parallel layer: its fallback aborts when two callers meet and does not survive a fork,
-while kernels that release the interpreter run on all cores, let progress be told and a
-stop be asked between chunks, and load from the cache like any other. For whole shapes
-instead of tips see `batch.shapes.solve_shapes`.
+solver, in chunks that a pool of threads takes one by one (`batch.threads`). For whole
+shapes instead of tips see `batch.shapes.solve_shapes`.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor, as_completed
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import shown, whole
 from ...core.errors import InputError
-from ...core.jit import njit
 from ...core.magnet import Magnet
 from ...core.progress import Progress, silent
-from ...core.units import MU0
 from ..fields import PULLED_IN, STABLE, UNSTABLE
 from ..magnet.field import magnet_block
-from ..planar.march import WX, WY, E, H, M
 from ..planar.solver import OK_UNSTABLE, TOUCHES, solve_planar_rows
+from ..scaling import direction, many_magnet_fields, many_rods, many_uniform_fields
 from .columns import COLUMNS, check_magnet, column
 from .lanes import HARD, solve_lanes
+from .threads import in_threads
 
 Array = NDArray[np.float64]
 
@@ -105,35 +99,14 @@ def solve_many(
     for name in RESULT.names or ():
         out[name] = np.nan if name not in ("outcome", "morse_index") else -1
     out["outcome"] = NOT_SOLVED
-    workers = _cores()
     if threads is not None:
-        workers = whole(threads, 1, _MOST_THREADS, "threads")
-    starts = list(range(0, n, CHUNK))
+        threads = whole(threads, 1, _MOST_THREADS, "threads")
 
-    def work(start: int) -> int:
-        if stop is not None and stop():
-            return 0
-        rows = slice(start, min(start + CHUNK, n))
+    def work(rows: slice) -> None:
         _solve_chunk({k: v[rows] for k, v in columns.items()}, magnet, out[rows])
-        return rows.stop - start
 
-    done = 0
-    if len(starts) == 1 or workers == 1:
-        for start in starts:
-            done += work(start)
-            progress(done, n)
-        return out
-    with ThreadPoolExecutor(workers) as pool:
-        for future in as_completed([pool.submit(work, start) for start in starts]):
-            done += future.result()
-            progress(done, n)
+    in_threads(work, n, CHUNK, threads=threads, progress=progress, stop=stop)
     return out
-
-
-def _cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _columns(
@@ -196,12 +169,15 @@ def _solve_chunk(
     columns: dict[str, Array], magnet: Magnet | None, out: NDArray[np.void]
 ) -> None:
     """Solve one chunk into `out`."""
-    rods, total_mm, margins = _rods(columns)
+    rods, total_mm, margins = many_rods(
+        columns["length_mm"], columns["E_MPa"], columns["side_mm"],
+        columns["remanence_mT"],
+    )  # fmt: skip
     n = len(rods)
     none = np.empty(0)
     if magnet is None:
-        flux_T, angle = columns["flux_mT"] * 1e-3, np.radians(columns["angle_deg"])
-        field = flux_T, np.cos(angle), np.sin(angle), none, none
+        flux_T = columns["flux_mT"] * 1e-3
+        field = flux_T, *direction(columns["angle_deg"]), none, none
     else:
         field = (
             none,
@@ -217,9 +193,10 @@ def _solve_chunk(
     hard = np.flatnonzero(outcome == HARD)
     if len(hard):
         if magnet is None:
-            fields = _uniform_fields(flux_T[hard], columns["angle_deg"][hard])
+            fields = many_uniform_fields(flux_T[hard], columns["angle_deg"][hard])
         else:
-            fields = _magnet_fields(magnet, columns["gap_mm"][hard], total_mm[hard])
+            gap_mm = columns["gap_mm"][hard]
+            fields = many_magnet_fields(magnet, gap_mm, total_mm[hard])
         found = _solve_hard(rods[hard], fields, margins[hard])
         tips[hard], outcome[hard], index[hard] = found
     out["tip_x_mm"] = tips[:, 0] * total_mm
@@ -228,67 +205,6 @@ def _solve_chunk(
     out["error_mm"] = tips[:, 3] * total_mm
     out["outcome"] = outcome
     out["morse_index"] = index
-
-
-def _rods(columns: dict[str, Array]) -> tuple[Array, Array, Array]:
-    """Return rods as `planar.march` takes them (n, k, 5), lengths, and margins."""
-    length = columns["length_mm"]
-    rods = np.empty((*length.shape, 5))
-    total = np.empty(len(length))
-    margins = np.empty(len(length))
-    given = length, columns["E_MPa"], columns["side_mm"], columns["remanence_mT"]
-    if not _pack(*given, 1e-9 / MU0, rods, total, margins):
-        raise InputError(
-            "designs: length_mm, side_mm in mm and E_MPa in MPa must be of comparable "
-            "size; instead received a design whose loads overflow"
-        )
-    return rods, total, margins
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _pack(length, modulus, side, remanence, moment, rods, total, margin):  # type: ignore[no-untyped-def]
-    """Fill `rods` from columns of shape (n, sections), root first.
-
-    `moment` is that of 1 mm2 and 1 mT, in A m. Return whether all is finite.
-    """
-    n, sections = length.shape
-    nothing = 0.0
-    for i in range(n):
-        total[i] = 0.0
-        widest = 0.0
-        for k in range(sections):
-            total[i] += length[i, k]
-            widest = max(widest, side[i, k])
-        margin[i] = widest / (2.0 * total[i])
-        EI = modulus[i, 0] * side[i, 0] ** 4 / 12.0
-        per_N = total[i] * total[i] / EI
-        for k in range(sections):
-            row = rods[i, sections - 1 - k]
-            area = side[i, k] * side[i, k]
-            row[H] = length[i, k] / total[i]
-            row[E] = EI / (modulus[i, k] * area * area / 12.0)
-            row[M] = area * remanence[i, k] * moment * per_N
-            row[WX] = row[WY] = 0.0
-            nothing += 0.0 * (row[H] + row[E] + row[M])
-    return nothing == 0.0
-
-
-def _uniform_fields(flux_T: Array, angle_deg: Array) -> Array:
-    angle = np.radians(angle_deg)
-    fields = np.zeros((len(flux_T), 17))
-    fields[:, 1] = flux_T * np.where(angle_deg % 180.0 == 90.0, 0.0, np.cos(angle))
-    fields[:, 2] = flux_T * np.where(angle_deg % 180.0 == 0.0, 0.0, np.sin(angle))
-    return fields
-
-
-def _magnet_fields(magnet: Magnet, gap_mm: Array, total_mm: Array) -> Array:
-    fields = np.empty((len(gap_mm), 17))
-    fields[:, 0] = 1.0
-    fields[:, 1:] = magnet_block(magnet, length_mm=0.0, gap_mm=0.0)
-    fields[:, 4:7] -= gap_mm[:, None] * np.array(magnet.axes()[2])
-    fields[:, 4] += total_mm
-    fields[:, 1:7] /= total_mm[:, None]
-    return fields
 
 
 def _solve_hard(

@@ -22,8 +22,10 @@ from ...core.centreline import Centreline
 from ...core.checks import whole
 from ...core.errors import InputError, SolverError
 from ...core.specimen import Specimen
-from ...core.units import MU0
+from ...core.units import T_from_mT
 from ..fields import STABLE, UNSTABLE, Support, UniformField, check_case
+from ..planar.march import E, H, M
+from ..scaling import rod_array, stiffness_Nmm2
 from .march import ORDER, march, scan
 
 Array = NDArray[np.float64]
@@ -109,16 +111,8 @@ def planar_rod(specimen: Specimen, field: UniformField, support: Support) -> Pla
             "gravity_m_s2 must be zero for the scan of all equilibria; instead "
             f"received {support.gravity_m_s2} m/s2: use solve() for shapes with weight"
         )
-    sections = specimen.sections[::-1]
-    length_m = specimen.length_mm * 1e-3
-    lengths = np.array([part.length_mm for part in sections]) / specimen.length_mm
-    sides_m = np.array(specimen.sides_mm[::-1]) * 1e-3
-    EI = np.array([part.E_MPa for part in sections]) * 1e6 * sides_m**4 / 12.0
-    remanence_T = np.array(specimen.remanences_mT[::-1]) * 1e-3
-    pull_N = sides_m**2 * remanence_T / MU0 * field.flux_mT * 1e-3
-    pull_N *= support.load_factor
-    unit = float(EI[0])
-    moment = pull_N * length_m**2 / unit
+    rows = rod_array(specimen, support)
+    moment = rows[:, M] * T_from_mT(field.flux_mT)
     turned = np.pi if moment[0] < 0.0 else 0.0
     if turned:
         moment = -moment
@@ -127,10 +121,11 @@ def planar_rod(specimen: Specimen, field: UniformField, support: Support) -> Pla
     if min(pull, 2.0 * np.pi - pull) < STRAIGHT:
         pull = 0.0
     rod = PlanarRod(
-        lengths=lengths, stiffness=EI / unit, moment=moment,
+        lengths=rows[:, H].copy(), stiffness=1.0 / rows[:, E], moment=moment,
         pull_rad=pull,
         clamp_rad=float(np.radians(support.clamp_angle_deg)),
-        length_mm=specimen.length_mm, stiffness_Nm2=unit,
+        length_mm=specimen.length_mm,
+        stiffness_Nm2=stiffness_Nmm2(specimen)[0] * 1e-6,
     )  # fmt: skip
     if np.max(np.abs(moment / rod.stiffness)) > LOAD_LIMIT:
         raise InputError(

@@ -14,32 +14,9 @@ from collections.abc import Callable
 import numpy as np
 
 from ...core.jit import njit
-from .march import PART
+from ..magnet.flux import PART, distance, in_reach
 
 _MOST_PIECES = 512
-
-
-@njit(**PART)
-def in_reach(field, margin):  # type: ignore[no-untyped-def]
-    """Tell whether a rod clamped at the origin is long enough to touch the magnet."""
-    if field[0] == 0.0:
-        return False
-    corner = math.sqrt(field[1] ** 2 + field[2] ** 2 + field[3] ** 2)
-    return math.hypot(field[4], field[5]) <= 1.0 + margin + corner
-
-
-@njit(**PART)
-def _distance(field, x, y, z):  # type: ignore[no-untyped-def]
-    """Return the distance of a point from the magnet."""
-    total = 0.0
-    dx = x - field[4]
-    dy = y - field[5]
-    dz = z - field[6]
-    for k in range(3):
-        along = field[7 + 3 * k] * dx + field[8 + 3 * k] * dy + field[9 + 3 * k] * dz
-        beyond = max(0.0, abs(along) - field[1 + k])
-        total += beyond * beyond
-    return math.sqrt(total)
 
 
 @njit(**PART)
@@ -57,7 +34,7 @@ def _arc_touches(field, margin, h, a, b):  # type: ignore[no-untyped-def]
         x = p * a[0] + (1.0 - p) * b[0] + q * a[3] + r * b[3]
         y = p * a[1] + (1.0 - p) * b[1] + q * a[4] + r * b[4]
         z = p * a[2] + (1.0 - p) * b[2] + q * a[5] + r * b[5]
-        if _distance(field, x, y, z) <= margin:
+        if distance(field, x, y, z) <= margin:
             return True
     return False
 
@@ -74,10 +51,10 @@ def touches_in_plane(field, margin, s, curve):  # type: ignore[no-untyped-def]
         x, y and tangent angle there.
     """
     ends = np.zeros((2, 6))
-    after = _distance(field, curve[0, 0], curve[1, 0], 0.0)
+    after = distance(field, curve[0, 0], curve[1, 0], 0.0)
     for k in range(1, s.shape[0]):
         before = after
-        after = _distance(field, curve[0, k], curve[1, k], 0.0)
+        after = distance(field, curve[0, k], curve[1, k], 0.0)
         h = s[k] - s[k - 1]
         if min(before, after) <= margin:
             return True
@@ -105,10 +82,10 @@ def touches(field, margin, s, line):  # type: ignore[no-untyped-def]
     """
     if not in_reach(field, margin):
         return False
-    after = _distance(field, line[0, 0], line[0, 1], line[0, 2])
+    after = distance(field, line[0, 0], line[0, 1], line[0, 2])
     for k in range(1, s.shape[0]):
         before = after
-        after = _distance(field, line[k, 0], line[k, 1], line[k, 2])
+        after = distance(field, line[k, 0], line[k, 1], line[k, 2])
         h = s[k] - s[k - 1]
         if min(before, after) <= margin:
             return True

@@ -14,8 +14,8 @@ import math
 import numpy as np
 
 from ...core.jit import njit
-from ..magnet.field import inside
-from .march import MAX_ORDER, PART, STATE, march
+from ..magnet.flux import PART, blocked
+from .march import MAX_ORDER, STATE, march
 
 SHRINK = 0.25
 """How each correction must shrink, as the theorem of Kantorovich asks for."""
@@ -89,7 +89,7 @@ def newton(rod, field, load, clamp, u, order, step, first, X, D, T, C):  # type:
     before = math.inf
     columns = D.shape[1]
     for _ in range(16):
-        if field[0] != 0.0 and inside(field[1:], u[1], u[2], 0.0, 0.0):
+        if blocked(field, u[1], u[2], 0.0, 0.0):
             return -1
         index = march(
             rod, field, load, u, order, step, columns, math.inf, nowhere, 0,

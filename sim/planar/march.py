@@ -16,10 +16,10 @@ first unknown is gamma = theta_L - phi: in a strong field gamma is exponentially
 and only as a number of its own, not as a difference of angles, does it keep its digits.
 
 A rod is an array (n, 5), tip first: length h, compliance e, magnetic load m per tesla
-and weight per length wx, wy. A field is an array (17,): 0 and (Bx, By), or 1 and the
-magnet's block (`magnet.field.magnet_block`) in lengths of L. The state X, shape (11,),
-holds theta, q, x, y, Px, Py, what acts within a section: e, wx, wy, and the flux
-density at the tip. The columns D, shape (11, 4), hold derivatives of the first nine.
+and weight per length wx, wy. A field is an array of its own (`magnet.flux`). The state
+X, shape (11,), holds theta, q, x, y, Px, Py, what acts within a section: e, wx, wy, and
+the flux density at the tip. The columns D, shape (11, 4), hold derivatives of the first
+nine.
 
 The kernels are parts (`PART`) of the few that Python calls, each of which holds one
 march in one place: every further place would be compiled and optimised again.
@@ -30,17 +30,8 @@ from __future__ import annotations
 import math
 
 from ...core.jit import njit
-from ..magnet.field import plane_flux
+from ..magnet.flux import PART, field_at, is_uniform
 
-PART = {
-    "cache": True,
-    "error_model": "numpy",
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-}
-"""Options of a function that only kernels call."""
-UNIFORM = 0.0
-CUBOID = 1.0
 H, E, M, WX, WY = 0, 1, 2, 3, 4
 """Columns of a rod."""
 STATE = 11
@@ -50,14 +41,6 @@ MOST_STEPS = 1500
 """Most steps of a section; more is asked for only where an iteration runs away."""
 SERIES = 4
 """Series kept of a step: theta, q, sin, cos; and the same of every column."""
-
-
-@njit(**PART)
-def field_at(field, x, y):  # type: ignore[no-untyped-def]
-    """Return (Bx, By, Gxx, Gxy, Gyy) of a field array."""
-    if field[0] == 0.0:
-        return field[1], field[2], 0.0, 0.0, 0.0
-    return plane_flux(field[1:], x, y)
 
 
 @njit(**PART, fastmath={"contract"})
@@ -279,7 +262,7 @@ def add_load(rod, field, i, load, u, columns, X, D):  # type: ignore[no-untyped-
         sf = math.sin(u[3])
     along = cf * b[0] + sf * b[1]
     across = cf * b[1] - sf * b[0]
-    if load * m != 0.0 and (i == 0 or (field[0] == 0.0 and rod[0, M] != 0.0)):
+    if load * m != 0.0 and (i == 0 or (is_uniform(field) and rod[0, M] != 0.0)):
         across = 0.0
     X[4] += load * m * along
     X[5] += load * m * across

@@ -15,13 +15,14 @@ from __future__ import annotations
 import math
 
 from ...core.jit import njit
-from .march import PART, WX, WY, E, H, M
+from ..magnet.flux import PART, is_uniform
+from .march import WX, WY, E, H, M
 
 
 @njit(**PART)
 def one_sided(rod, field):  # type: ignore[no-untyped-def]
     """Tell whether the first road applies: uniform field, one sign, no weight."""
-    if field[0] != 0.0 or rod[0, M] == 0.0:
+    if not is_uniform(field) or rod[0, M] == 0.0:
         return False
     for i in range(rod.shape[0]):
         if rod[i, WX] != 0.0 or rod[i, WY] != 0.0 or rod[i, M] * rod[0, M] < 0.0:

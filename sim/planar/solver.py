@@ -20,11 +20,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.errors import InputError, SolverError
 from ...core.jit import njit
-from ..magnet.field import inside
-from .contact import in_reach, load_before_touching, touches_in_plane
+from ...core.specimen import Specimen
+from ..fields import Field
+from ..magnet.flux import PART, blocked, in_reach, is_uniform
+from .contact import load_before_touching, touches_in_plane
 from .follow import SHRINK, SMALL, follow_load, residual, solve3, straight
-from .march import MAX_ORDER, PART, STATE, WX, WY, E, H, M, march
+from .march import MAX_ORDER, STATE, WX, WY, E, H, M, march
 from .one_sided import first_guess, narrow, one_sided
 
 Array = NDArray[np.float64]
@@ -120,8 +123,8 @@ def _solve_row(  # type: ignore[no-untyped-def]
     index = 0
     x = y = 0.0
     for k in range(220):
-        free = field[0] == 0.0 or stage == SHAPE
-        if not free and inside(field[1:], u[1], u[2], 0.0, 0.0):
+        free = is_uniform(field) or stage == SHAPE
+        if not free and blocked(field, u[1], u[2], 0.0, 0.0):
             break
         zeros = march(
             rod, field, 1.0, u,
@@ -355,3 +358,26 @@ def solve_planar(
         found[0, 6] = _load_before_touching(found[0, 6], rod, *case[1:])
     outcome, index, error, bx, by, moment, load = found[0].tolist()
     return int(outcome), int(index), load, error, bx, by, moment, out[0], u[0]
+
+
+def failure(
+    outcome: int, specimen: Specimen, field: Field, load: float
+) -> InputError | SolverError:
+    """Return the error that says why the kernel gave no answer."""
+    if outcome == TOUCHES:
+        gap_mm = getattr(field, "gap_mm", float("nan"))
+        return InputError(
+            f"gap_mm must leave the undeformed rod {specimen.name!r} clear of the "
+            f"magnet, with half its side to spare; instead received {gap_mm:g} mm"
+        )
+    if outcome == TOO_STRONG:
+        return InputError(
+            "the load on the rod (flux_mT, remanence_mT, weight) must be less than "
+            "1600 times its stiffness EI / L^2, or 40000 times in a uniform field "
+            "without weight; instead received one beyond it: check E_MPa, side_mm and "
+            "flux_mT"
+        )
+    return SolverError(
+        f"no equilibrium of {specimen.name!r} could be followed beyond "
+        f"{load:.3g} of its load; try a smaller flux_mT or a larger gap_mm"
+    )

@@ -18,8 +18,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.jit import njit
+from ..magnet.flux import PART, field_at
 from .march import (
-    PART,
     STATE,
     H,
     M,
@@ -27,7 +27,6 @@ from .march import (
     advance,
     begin,
     enter_section,
-    field_at,
     series,
     substeps,
 )

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from ...core.jit import njit
+from ..magnet.flux import PART, field_at
 from ..planar.follow import solve3
 from ..planar.march import (
-    PART,
     STATE,
     WX,
     WY,
@@ -21,7 +21,6 @@ from ..planar.march import (
     begin,
     column_step,
     enter_section,
-    field_at,
     series,
     substeps,
 )

@@ -21,10 +21,10 @@ from numpy.typing import NDArray
 from ...core.checks import finite
 from ...core.errors import InputError
 from ...core.specimen import Specimen
-from ...core.units import MU0, rad_from_deg
+from ...core.units import rad_from_deg
 from ..fields import Field, MagnetField, Support, UniformField
 from ..planar.march import WX, WY, E, H, M
-from ..scaling import checked_density, field_array, rod_array, stiffness_Nmm2
+from ..scaling import checked_density, field_array, loads_per_unit, rod_array
 
 Array = NDArray[np.float64]
 
@@ -68,14 +68,6 @@ def change_of(name: str, specimen: Specimen, field: Field, support: Support) -> 
     return change
 
 
-def _unit_rows(specimen: Specimen, support: Support) -> tuple[Array, Array]:
-    """Return m per mT of remanence (load factor 1) and weight per (kg/m3 m/s2)."""
-    length_mm = specimen.length_mm
-    per_N = length_mm**2 / stiffness_Nmm2(specimen)[0]
-    area = np.array(specimen.sides_mm)[::-1] ** 2
-    return area * 1e-9 / MU0 * per_N, area * length_mm * 1e-9 * per_N
-
-
 def _of_E(
     change: Change, i: int, specimen: Specimen, field: Field, support: Support
 ) -> None:
@@ -94,7 +86,7 @@ def _of_side(
 def _of_remanence(
     change: Change, i: int, specimen: Specimen, field: Field, support: Support
 ) -> None:
-    per_mT, _ = _unit_rows(specimen, support)
+    per_mT, _ = loads_per_unit(specimen)
     change.rod[-1 - i, M] += support.load_factor * per_mT[-1 - i]
 
 
@@ -123,7 +115,7 @@ def _of_loads(
     specimen: Specimen,
     support: Support,
 ) -> None:
-    per_mT, per_weight = _unit_rows(specimen, support)
+    per_mT, per_weight = loads_per_unit(specimen)
     if key == "load_factor" and index is None:
         change.rod[:, M] = per_mT * np.array(specimen.remanences_mT)[::-1]
     elif key == "density_kg_m3" and index is None:

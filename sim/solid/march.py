@@ -24,7 +24,7 @@ import math
 import numpy as np
 
 from ...core.jit import njit
-from ..magnet.field import cuboid_flux
+from ..magnet.flux import flux_at, is_uniform
 
 H, E, M, WX, WY, T, G, ALPHA, RHO, CHI, SIDE, JOINT, SOFT = range(13)
 WIDTH = 13
@@ -112,14 +112,14 @@ def _load(rod, field, load, u, X, b):  # type: ignore[no-untyped-def]
     m = load * rod[0, M]
     X[:] = 0.0
     X[0] = u[0]
-    if field[0] == 0.0:
+    if is_uniform(field):
         fx, fy = m * field[1], m * field[2]
     else:
         a = rod[0, SIDE] / math.sqrt(12.0)
         nx, ny = -math.sin(u[0] + u[3]) * a, math.cos(u[0] + u[3]) * a
         fx = fy = 0.0
         for side in (-1.0, 1.0):
-            cuboid_flux(field[1:], u[1] + side * nx, u[2] + side * ny, a, b)
+            flux_at(field, u[1] + side * nx, u[2] + side * ny, a, b)
             fx += 0.5 * m * b[0]
             fy += 0.5 * m * b[1]
             X[1] -= 0.5 * m * side * (nx * b[1] - ny * b[0])
@@ -134,12 +134,9 @@ def _cross(rod, field, load, i, u, X, b):  # type: ignore[no-untyped-def]
     if m == 0.0:
         return
     cf, sf = math.cos(u[3]), math.sin(u[3])
-    if field[0] == 0.0:
-        b[0], b[1] = field[1], field[2]
-    else:
-        x = u[1] + cf * X[2] - sf * X[3]
-        y = u[2] + sf * X[2] + cf * X[3]
-        cuboid_flux(field[1:], x, y, 0.0, b)
+    x = u[1] + cf * X[2] - sf * X[3]
+    y = u[2] + sf * X[2] + cf * X[3]
+    flux_at(field, x, y, 0.0, b)
     X[4] += m * (cf * b[0] + sf * b[1])
     X[5] += m * (cf * b[1] - sf * b[0])
 

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from ...core.jit import njit
-from ..magnet.field import inside
+from ..magnet.flux import blocked, is_uniform
 from ..planar.follow import solve3
 from ..planar.march import jacobi
 from .march import (  # fmt: skip
@@ -49,7 +49,7 @@ def columns(rod, field, base, clamp, load, u, X, S, b, trails, miss, D):  # type
     moved = np.zeros(3)
     n = march(rod, field, base, clamp, load, u, COARSE_ORDER, X, S, b, here, miss)
     for a in range(3):
-        if a > 0 and field[0] == 0.0:
+        if a > 0 and is_uniform(field):
             D[0, a] = 0.0
             D[2, a] = 1.0 if a == 1 else 0.0
             D[3, a] = 1.0 if a == 2 else 0.0
@@ -93,7 +93,7 @@ def newton(rod, field, base, clamp, load, u, X, S, b, trails, D):  # type: ignor
     miss, d = np.zeros(3), np.zeros(3)
     order, before, fresh = COARSE_ORDER, math.inf, True
     for k in range(40):
-        if field[0] != 0.0 and inside(field[1:], u[1], u[2], 0.0, 0.5 * rod[0, SIDE]):
+        if blocked(field, u[1], u[2], 0.0, 0.5 * rod[0, SIDE]):
             return False
         if k == 0:
             columns(rod, field, base, clamp, load, u, X, S, b, trails, miss, D)
@@ -224,9 +224,8 @@ def solve_shape(rod, field, base, clamp, u, s, out):  # type: ignore[no-untyped-
     shape(rod, field, base, u, s, out)
     shift = -base[1] * rod[-1, E] * moment
     end_zone(s, clamp, shift, END_ZONE * rod[-1, SIDE], out)
-    if field[0] != 0.0:
-        margin = 0.5 * np.max(rod[:, SIDE])
-        for k in range(s.shape[0]):
-            if inside(field[1:], out[0, k], out[1, k], 0.0, margin):
-                return -1, load, error, moment
+    margin = 0.5 * np.max(rod[:, SIDE])
+    for k in range(s.shape[0]):
+        if blocked(field, out[0, k], out[1, k], 0.0, margin):
+            return -1, load, error, moment
     return index, load, error, moment

@@ -42,9 +42,9 @@ from ..fields import (  # fmt: skip
     UniformField,
     check_case,
 )
-from ..magnet.field import cuboid_flux
+from ..magnet.flux import flux_at
 from ..planar.solver import COARSE_ORDER as START_ORDER
-from ..planar.solver import GONE, solve_planar
+from ..planar.solver import GONE, failure, solve_planar
 from ..planar.solver import STEP as PLAIN_STEP
 from ..scaling import field_array, rod_array, stations, stiffness_Nmm2
 from .march import (  # fmt: skip
@@ -192,8 +192,6 @@ def solve_solid(
         held.plain, flux, clamp, held.margin, stations(61), START_ORDER, PLAIN_STEP
     )
     if outcome > GONE:
-        from ..one_rod import failure  # which calls this module
-
         raise failure(outcome, specimen, field, limit)
     load = held.magnetic * math.hypot(bx, by) + held.weight
     _refuse_load(load * held.softest)
@@ -315,8 +313,6 @@ def _refuse_spatial(field: Field, support: Support) -> None:
 
 
 def _flux_mT(flux: Array, x: float, y: float) -> tuple[float, float]:
-    if flux[0] == 0.0:
-        return mT_from_T(float(flux[1])), mT_from_T(float(flux[2]))
     out = np.empty(12)
-    cuboid_flux(flux[1:], x, y, 0.0, out)
+    flux_at(flux, x, y, 0.0, out)
     return mT_from_T(float(out[0])), mT_from_T(float(out[1]))

@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from ...core.jit import njit
+from ..magnet.flux import is_uniform
 from .march import COLUMN, STATE, begin, cross, loaded, step, steps_of, workspace
 
 SPLIT = 3
@@ -23,7 +24,7 @@ third power of that distance, and must stand out from what a step leaves."""
 @njit(cache=True)
 def unknowns(field):  # type: ignore[no-untyped-def]
     """Return how many unknowns act on the shape: turn of the tip, and its shift."""
-    return 3 if field[0] == 0.0 else 6
+    return 3 if is_uniform(field) else 6
 
 
 @njit(cache=True)

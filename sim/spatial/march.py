@@ -28,7 +28,7 @@ import math
 import numpy as np
 
 from ...core.jit import njit
-from ..magnet.field import cuboid_flux
+from ..magnet.flux import flux_at, is_uniform
 
 H, C1, C2, C3, AXIAL, MU1, MU2, K1, K2, K3, WX, WY, WZ = range(13)
 WIDTH = 13
@@ -50,16 +50,6 @@ _A = np.array(
     ]
 )
 _B = np.array([13 / 200, 0.0, 11 / 40, 11 / 40, 4 / 25, 4 / 25, 13 / 200])
-
-
-@njit(cache=True)
-def flux_at(field, x, y, z, b):  # type: ignore[no-untyped-def]
-    """Write B and its gradient (12 numbers) of a field array into `b`."""
-    if field[0] == 0.0:
-        b[:] = 0.0
-        b[0], b[1], b[2] = field[1], field[2], field[3]
-    else:
-        cuboid_flux(field[1:], x, y, z, b)
 
 
 @njit(cache=True)
@@ -138,7 +128,7 @@ def _distributed(p, field, y, b, Z, F, b2):  # type: ignore[no-untyped-def]
         g1 = c2 * x0 - c0 * x2
         g2 = c0 * x1 - c1 * x0
         size = max(abs(Z[6, a]), abs(Z[7, a]), abs(Z[8, a]))
-        scale = PROBE / size if size > 0.0 and field[0] != 0.0 else 0.0
+        scale = PROBE / size if size > 0.0 and not is_uniform(field) else 0.0
         if scale > 0.0:
             flux_at(
                 field, y[12] + scale * Z[6, a], y[13] + scale * Z[7, a],

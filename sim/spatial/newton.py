@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from ...core.jit import njit
-from ..magnet.field import inside
+from ..magnet.flux import blocked
 from .index import matrix, morse_index, solve6, unknowns
 from .march import (  # fmt: skip
     COLUMN,
@@ -116,7 +116,7 @@ def newton(rod, field, load, n, Rc, R, r, first, y, Z, J, none, work, bare):  # 
     before = math.inf
     fine = False
     for k in range(24):
-        if field[0] != 0.0 and inside(field[1:], r[0], r[1], r[2], 0.0):
+        if blocked(field, r[0], r[1], r[2], 0.0):
             return False
         steps = n if fine else COARSE * n
         if before > CHORD:

@@ -32,10 +32,10 @@ from ..fields import (
     Support,
     UniformField,
 )
-from ..magnet.field import BLOCK_SIZE
+from ..magnet.flux import UNIFORM, WIDTH, flux_at
 from ..planar.contact import load_before_touching, touches
 from ..scaling import MOST_POINTS, field_array, stations
-from .march import AXIAL, C1, C3, K1, K3, MU1, MU2, WX, WY, WZ, H, flux_at
+from .march import AXIAL, C1, C3, K1, K3, MU1, MU2, WX, WY, WZ, H
 from .newton import shape, solve_pose
 from .rod import SpatialRod, SpatialSection, Vector, rod_table
 
@@ -187,7 +187,7 @@ def solve_spatial(
     clamp = np.array([[-sin, 0.0, cos], [cos, 0.0, sin], [0.0, 1.0, 0.0]])
     s = stations(points)
     unloaded = _unloaded(table, clamp, s)
-    if flux[0] != 0.0 and touches(flux, margin, s, unloaded):
+    if flux[0] != UNIFORM and touches(flux, margin, s, unloaded):
         raise InputError(
             "gap_mm must leave the undeformed rod clear of the magnet, with half its "
             f"side to spare; instead received {getattr(field, 'gap_mm', math.nan):g} mm"
@@ -211,7 +211,7 @@ def _unloaded(table: Array, clamp: Array, s: Array) -> Array:
     direction = clamp[:, 2]
     if not np.any(table[:, K1 : K3 + 1]):
         return np.hstack([np.outer(s, direction), np.tile(direction, (len(s), 1))])
-    bare, nothing = table.copy(), np.zeros(1 + BLOCK_SIZE)
+    bare, nothing = table.copy(), np.zeros(WIDTH)
     bare[:, LOADS] = 0.0
     n = _steps(bare, nothing, direction)
     R, r, states = np.empty((3, 3)), np.empty(3), np.empty((len(s), 18))
@@ -254,7 +254,7 @@ def _flux_array(field: Field | Sequence[float], length_mm: float) -> Array:
             f"mT; instead received {shown(field)}"
         )
     flux_mT = vector(field, "flux_mT", "mT", FLUX_LIMIT_T * 1e3)
-    out = np.zeros(1 + BLOCK_SIZE)
+    out = np.zeros(WIDTH)
     out[1:4] = np.array(flux_mT) * 1e-3
     return out
 

@@ -7,7 +7,7 @@ import pytest
 from magbend.core.errors import StoreError
 from magbend.rig.errors import InterlockError, LinkLostError
 from magbend.rig.runs.scan_field import scan_field
-from magbend.sim.magnet.fit import read_readings
+from magbend.sim.magnet.readings import read_readings
 
 
 def test_a_scan_writes_a_table_that_sim_magnet_reads(bench, tmp_path: Path) -> None:

@@ -14,9 +14,8 @@ from magbend.sim import fit_magnet, magnet_flux_mT
 from magbend.sim.magnet.fit import (
     axis_flux_by_integral_mT,
     axis_share,
-    paper_readings,
-    read_readings,
 )
+from magbend.sim.magnet.readings import paper_readings, read_readings
 from magbend.sim.magnet.student_t import student_t_95
 
 
