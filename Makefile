@@ -1,6 +1,7 @@
 # make demo    set up .venv and run the whole loop on the twin bench
 # make test    set up .venv with the test tools and run the test-suite
 # make check   lint, format and type checks, and the import contract
+# make docs    build the site into docs/site (the tests of this are in .ci/run)
 # make clean   remove .venv and build products
 
 PYTHON ?= python3
@@ -9,7 +10,7 @@ OUT    ?= demo
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test check clean
+.PHONY: demo test check docs clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.ready
@@ -26,6 +27,10 @@ check: $(VENV)/.ready-test
 	cd build/check && ../../$(BIN)/mypy --config-file ../../pyproject.toml \
 	  -p magbend --namespace-packages --explicit-package-bases
 	cd build/check && ../../$(BIN)/lint-imports --config ../../pyproject.toml
+
+docs: $(VENV)/.ready-test
+	$(BIN)/python -m sphinx -W --keep-going -q -j 2 docs docs/site
+	@echo "docs/site/index.html"
 
 $(VENV)/.created:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \

@@ -2,7 +2,8 @@
 
 A plain rod is 0.3 to 0.6 % too soft at the tip against a hard-magnetic neo-Hookean
 solid whose root face is fixed. Five effects, each a term of the rod's equations, close
-the gap; `docs/solid.md` tells what each is worth and how its constant was found.
+the gap; `docs/explanations/solid.md` tells what each is worth and how its constant
+was found.
 
 * Stretch EA, and shear k GA with Cowper's k = 10 (1 + nu) / (12 + 11 nu) for rectangles
   (J. Appl. Mech. 33, 335, 1966).
