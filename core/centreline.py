@@ -15,8 +15,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import ConfigError, InputError
+from .errors import InputError
 from .files import write_text
+from .table import read_table
 
 COLUMNS = ("s_mm", "x_mm", "y_mm", "theta_rad", "kappa_per_mm")
 
@@ -121,18 +122,6 @@ class Centreline:
         ConfigError
             If the file is missing, lacks a column or holds something else than numbers.
         """
-        try:
-            with path.open(encoding="utf-8") as file:
-                header = file.readline().strip().split(",")
-                table = np.loadtxt(file, delimiter=",", ndmin=2)
-        except FileNotFoundError:
-            raise ConfigError(f"{path}: there is no such file") from None
-        except (OSError, ValueError) as error:
-            raise ConfigError(f"{path}: cannot be read as a table: {error}") from None
-        missing = [name for name in COLUMNS if name not in header]
-        if missing or table.shape[1] != len(header):
-            raise ConfigError(
-                f"{path}: a shape table must have the columns {','.join(COLUMNS)}; "
-                f"instead received {','.join(header)}"
-            )
-        return cls(**{name: table[:, header.index(name)] for name in COLUMNS})
+        table = read_table(path)
+        table.require(*COLUMNS, hint="a shape table needs them all")
+        return cls(**{name: table.numbers(name) for name in COLUMNS})

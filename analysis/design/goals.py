@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from ...core.centreline import Centreline
 from ...core.checks import finite, positive, within
-from ...core.errors import ConfigError, InputError
-from ...core.toml import read_text
+from ...core.errors import InputError
+from ...core.table import read_table
 from ..shapes import descriptors
 
 Array = NDArray[np.float64]
@@ -199,19 +199,6 @@ def read_points(path: Path, columns: tuple[str, str]) -> Array:
     ConfigError
         If the file is missing, lacks a column or holds something else than numbers.
     """
-    lines = [line for line in read_text(path).splitlines() if line.strip()]
-    header = [name.strip() for name in lines[0].split(",")] if lines else []
-    if not set(columns) <= set(header):
-        raise ConfigError(
-            f"{path}: must have the columns {','.join(columns)} in its first line; "
-            f"instead received {','.join(header) or 'nothing'}"
-        )
-    at = [header.index(name) for name in columns]
-    rows = []
-    for number, line in enumerate(lines[1:], start=2):
-        cells = line.split(",")
-        try:
-            rows.append([float(cells[i]) for i in at])
-        except (ValueError, IndexError):
-            raise ConfigError(f"{path}, line {number}: is no row of numbers") from None
-    return np.array(rows).reshape(-1, 2)
+    table = read_table(path)
+    table.require(*columns)
+    return np.column_stack([table.numbers(name) for name in columns])

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from ...core.checks import finite, positive
-from ...core.errors import ConfigError, InputError
-from ...core.toml import read_text
+from ...core.errors import InputError
+from ...core.table import read_table
 from ...sim import gmc
 from ..runs.load import RunData
 
@@ -251,17 +251,11 @@ def read_probe_csv(
             [rod.remanence_mT for rod in rods],
             [rod.length_mm for rod in rods],
         )
-    import csv
-
-    rows = list(csv.DictReader(read_text(path).splitlines()))
-    try:
-        return (
-            [float(row["side_mm"]) for row in rows],
-            [float(row["reading_mT"]) for row in rows],
-            [float(row.get("length_mm") or 30.0) for row in rows],
-        )
-    except (KeyError, ValueError, TypeError) as error:
-        raise ConfigError(
-            f"{path}: must have numbers in the columns side_mm and reading_mT (and "
-            f"length_mm, if not 30); instead found {error}"
-        ) from None
+    table = read_table(path)
+    table.require("side_mm", "reading_mT", hint="and length_mm, if not 30 mm")
+    sides_mm = table.numbers("side_mm")
+    lengths_mm = np.full_like(sides_mm, 30.0)
+    if table.has("length_mm"):
+        given = table.numbers("length_mm", blanks=True)
+        lengths_mm = np.where(np.isnan(given), lengths_mm, given)
+    return sides_mm.tolist(), table.numbers("reading_mT").tolist(), lengths_mm.tolist()

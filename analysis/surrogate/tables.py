@@ -25,14 +25,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.columns import parse_number
 from ...core.errors import ConfigError, InputError, StoreError
 from ...core.files import write_text
-from ...core.toml import read_text
+from ...core.table import Table, read_table
 from ...sim.batch.shapes import Designs, solve_shapes
 
 Array = NDArray[np.float64]
 
 POINTS = 181
+_PARAMETER = re.compile(r"length\d+_mm|E\d+_MPa|side_mm|remanence_mT|flux_mT|angle_deg")
 DEGREES = ((0, 0), (1, 0), (0, 1), (1, 1), (2, 1))
 """Degrees in s / L and in the bend that are tried; (0, 0) is one constant."""
 
@@ -269,54 +271,36 @@ def _deviation(case: Case, degree: tuple[int, int], coefficients: Array) -> floa
 
 
 def _read_table(path: Path) -> list[Case]:
+    table = read_table(path)
+    table.require("x_mm", "y_mm")
     constants: dict[str, float] = {}
-    names: list[str] = []
-    rows: list[list[float]] = []
-    for number, line in enumerate(read_text(path).splitlines(), start=1):
-        text = line.strip()
-        if text.startswith("%"):
-            key = re.match(r"%\s*([\w]+)\s*=\s*([-+.\deE]+)\s*$", text)
-            if key:
-                constants[key.group(1)] = float(key.group(2))
-            elif not rows:
-                names = _column_names(text[1:])
-        elif text:
-            rows.append(_numbers(path, number, text, len(names)))
-    wanted = {"x_mm", "y_mm"}
-    if not rows or not wanted <= set(names):
-        raise ConfigError(
-            f"{path}: must have a % line that names the columns, with x_mm and y_mm, "
-            "and rows of numbers"
-        )
-    table = np.array(rows)
-    if not np.all(np.isfinite(table)):
-        raise ConfigError(f"{path}: holds NaN or infinity")
-    columns = dict(zip(names, table.T, strict=True))
-    at = [i for i, name in enumerate(names) if name not in ("s_mm", "x_mm", "y_mm")]
-    group = np.unique(table[:, at], axis=0, return_inverse=True)[1].ravel()
+    for comment in table.comments:
+        key, _, value = (part.strip() for part in comment.partition("="))
+        number = parse_number(value)
+        if _PARAMETER.fullmatch(key) and number is not None:
+            constants[key] = number
+    varied = [name for name in _parameters(table) if table.has(name)]
+    columns = {name: table.numbers(name) for name in ("x_mm", "y_mm", *varied)}
+    if table.has("s_mm"):
+        columns["s_mm"] = table.numbers("s_mm")
+    values = np.column_stack(
+        [np.zeros(len(table.rows)), *(columns[name] for name in varied)]
+    )
+    group = np.unique(values, axis=0, return_inverse=True)[1].ravel()
     return [
         _case(path, {n: c[group == g] for n, c in columns.items()}, constants)
         for g in range(int(group.max()) + 1)
     ]
 
 
-def _column_names(text: str) -> list[str]:
-    """Split a header; ``x (mm)`` counts as ``x_mm``."""
-    joined = re.sub(r"(\w+)\s*\(([\w/%]+)\)", r"\1_\2", text)
-    return [name for name in re.split(r"[,\s]+", joined) if name]
-
-
-def _numbers(path: Path, number: int, text: str, count: int) -> list[float]:
-    try:
-        values = [float(part) for part in re.split(r"[,\s]+", text)]
-    except ValueError:
-        values = []
-    if len(values) != count:
-        raise ConfigError(
-            f"{path}, line {number}: must hold {count} numbers, one for each column "
-            "named in the % line"
-        )
-    return values
+def _parameters(table: Table) -> list[str]:
+    """Names of the parameters that a table may have as columns."""
+    count = 1
+    while table.has(f"length{count + 1}_mm"):
+        count += 1
+    sections = [f"{key}{i + 1}{unit}" for i in range(count)
+                for key, unit in (("length", "_mm"), ("E", "_MPa"))]  # fmt: skip
+    return [*sections, "side_mm", "remanence_mT", "flux_mT", "angle_deg"]
 
 
 def _case(path: Path, columns: dict[str, Array], constants: dict[str, float]) -> Case:

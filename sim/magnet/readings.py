@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import csv
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...core.errors import ConfigError
+from ...core.table import read_table
 from ...core.units import T_from_mT, mT_from_T
 from .fit import axis_share
 
@@ -50,41 +49,8 @@ def read_readings(path: Path) -> tuple[list[float], list[float], list[float] | N
         If the file is missing, lacks a column, has no row or holds something else than
         numbers: with file and line.
     """
-    from ...core.toml import read_text
-
-    rows = list(csv.DictReader(read_text(path).splitlines(), skipinitialspace=True))
-    if not rows:
-        raise ConfigError(f"{path}: must hold at least one reading; it holds none")
-    for line, row in enumerate(rows, start=2):
-        if None in row:
-            raise ConfigError(
-                f"{path}, line {line}: has more values than the header has columns; "
-                "write decimals with a point, not a comma"
-            )
-    columns: dict[str, list[float]] = {}
-    names = [str(name).strip() for name in rows[0]]
-    for name in ("gap_mm", "flux_mT"):
-        if name not in names:
-            raise ConfigError(
-                f"{path}: must have the columns gap_mm,flux_mT and optionally sd_mT; "
-                f"instead received {','.join(names)}"
-            )
-    for name in ("gap_mm", "flux_mT", "sd_mT"):
-        if name in names:
-            columns[name] = [
-                _number(row.get(name), path, line, name)
-                for line, row in enumerate(rows, start=2)
-            ]
-    return columns["gap_mm"], columns["flux_mT"], columns.get("sd_mT")
-
-
-def _number(text: str | None, path: Path, line: int, name: str) -> float:
-    try:
-        value = float(text or "")
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise ConfigError(
-            f"{path}, line {line}: {name} must be a number; instead received {text!r}"
-        )
-    return value
+    table = read_table(path)
+    table.require("gap_mm", "flux_mT", hint="and optionally sd_mT")
+    gaps_mm, flux_mT = table.numbers("gap_mm"), table.numbers("flux_mT")
+    sd_mT = table.numbers("sd_mT").tolist() if table.has("sd_mT") else None
+    return gaps_mm.tolist(), flux_mT.tolist(), sd_mT

@@ -75,7 +75,7 @@ def test_probe_refuses_what_cannot_be(tmp_path: Path) -> None:
         probe_factor(1.0, 30.0, -0.1)
     table = tmp_path / "readings.csv"
     table.write_text("side,reading\n1,2\n")
-    with pytest.raises(ConfigError, match="side_mm and reading_mT"):
+    with pytest.raises(ConfigError, match="head it side_mm"):
         read_probe_csv(table)
 
 

@@ -161,10 +161,10 @@ def test_reads_a_table(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "pattern"),
     [
-        ("gap_mm,flux_mT\n", "at least one reading"),
-        ("gap,flux\n1,2\n", "gap_mm,flux_mT"),
+        ("gap_mm,flux_mT\n", "at least one row"),
+        ("gap,flux\n1,2\n", "without a unit; head it gap_mm"),
         ("gap_mm,flux_mT\n70,38\n60,much\n", "line 3: flux_mT"),
-        ("gap_mm,flux_mT\n70\n", "line 2: flux_mT"),
+        ("gap_mm,flux_mT\n70\n", "line 2: has 1 of the 2 values"),
     ],
 )
 def test_bad_tables_name_the_line(tmp_path: Path, text: str, pattern: str) -> None:

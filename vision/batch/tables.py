@@ -8,7 +8,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.centreline import Centreline
-from ...core.errors import ConfigError
+from ...core.table import Table, read_table
 from ..camera.calibration import Calibration
 from ..measurement import DEVIATION_COLUMNS, NAN2, POINT_COLUMNS, Measurement, Pose
 
@@ -30,6 +30,8 @@ FRAME_HEADER = (
     "clamp_y_mm", "clamp_angle_deg", "rod_height_mm", "reason",
     "clamp_angle_sd_deg", "own_angle_deg", "own_angle_sd_deg", "shared_clamp",
 )  # fmt: skip
+_FRAME_TEXTS = ("image", "status", "flags", "reason", "shared_clamp")
+_FRAME_NUMBERS = tuple(name for name in FRAME_HEADER if name not in _FRAME_TEXTS)
 EDGE_HEADER = ("image", "side", "point", "x_px", "y_px", "x_mm", "y_mm")
 SIDES = ("left", "right")
 
@@ -179,8 +181,16 @@ def read_frames(path: Path) -> list[FrameRow]:
         If the file is missing, is no table, lacks image or status, or holds something
         else than numbers.
     """
-    names, lines = _read(path, ("image", "status"))
-    return [_frame(path, dict(zip(names, cells, strict=False))) for cells in lines]
+    table = _read(path, ("image", "status"))
+    texts = {name: table.texts(name) for name in _FRAME_TEXTS}
+    numbers = {name: _numbers(table, name) for name in _FRAME_NUMBERS}
+    return [
+        _frame(
+            {name: column[i] for name, column in texts.items()},
+            {name: float(column[i]) for name, column in numbers.items()},
+        )
+        for i in range(len(table.rows))
+    ]
 
 
 def read_centrelines(path: Path) -> dict[str, dict[str, Array]]:
@@ -198,22 +208,16 @@ def read_centrelines(path: Path) -> dict[str, dict[str, Array]]:
         If the file is missing, is no table, lacks image, s_mm, x_mm, y_mm or theta_rad,
         or holds something else than numbers.
     """
-    names, lines = _read(path, CENTRELINE_HEADER[:5])
-    known = [name for name in CENTRELINE_COLUMNS if name in names]
-    found = {}
-    for image, values in _by_image(path, names, lines, known).items():
-        columns = dict.fromkeys(CENTRELINE_COLUMNS, np.full(len(values), np.nan))
-        found[image] = columns | dict(zip(known, values.T, strict=True))
-    return found
+    return _by_image(_read(path, CENTRELINE_HEADER[:5]), CENTRELINE_COLUMNS)
 
 
 def read_edges(path: Path) -> dict[str, Array]:
     """Read an edge table: by image, as in `Done`."""
-    names, lines = _read(path, EDGE_HEADER)
-    side = names.index("side")
-    for cells in lines:
-        cells[side] = str(SIDES.index(cells[side])) if cells[side] in SIDES else "?"
-    return _by_image(path, names, lines, EDGE_HEADER[1:])
+    table = _read(path, EDGE_HEADER)
+    sides = [float(SIDES.index(side)) for side in table.texts("side")]
+    columns = [np.array(sides), *(_numbers(table, name) for name in EDGE_HEADER[2:])]
+    values = np.column_stack(columns)
+    return {image: values[rows] for image, rows in _rows_of(table).items()}
 
 
 def to_centreline(columns: Mapping[str, Array]) -> Centreline:
@@ -251,9 +255,8 @@ def _frame_cells(row: FrameRow) -> list[str]:
     ]  # fmt: skip
 
 
-def _frame(path: Path, cells: Mapping[str, str]) -> FrameRow:
-    def value(name: str) -> float:
-        return _number(path, name, cells.get(name, ""))
+def _frame(text: Mapping[str, str], number: Mapping[str, float]) -> FrameRow:
+    value = number.__getitem__
 
     def pair(name: str, unit: str) -> tuple[float, float]:
         return value(f"{name}_x_{unit}"), value(f"{name}_y_{unit}")
@@ -265,9 +268,9 @@ def _frame(path: Path, cells: Mapping[str, str]) -> FrameRow:
         height_mm = height_mm if math.isfinite(height_mm) else 0.0
         pose = Pose(x_mm=x_mm, y_mm=y_mm, angle_deg=angle, height_mm=height_mm)
     return FrameRow(
-        image=cells["image"],
-        status=cells["status"],
-        flags=tuple(cells.get("flags", "").replace(";", " ").split()),
+        image=text["image"],
+        status=text["status"],
+        flags=tuple(text["flags"].replace(";", " ").split()),
         length_mm=value("length_mm"),
         tip_mm=pair("tip", "mm"),
         tip_angle_deg=value("tip_angle_deg"),
@@ -275,11 +278,11 @@ def _frame(path: Path, cells: Mapping[str, str]) -> FrameRow:
         clamp_px=pair("clamp", "px"),
         tip_px=pair("tip", "px"),
         pose=pose,
-        reason=cells.get("reason", ""),
+        reason=text["reason"],
         clamp_angle_sd_deg=value("clamp_angle_sd_deg"),
         own_angle_deg=value("own_angle_deg"),
         own_angle_sd_deg=value("own_angle_sd_deg"),
-        shared_clamp=cells.get("shared_clamp", ""),
+        shared_clamp=text["shared_clamp"],
     )
 
 
@@ -296,46 +299,30 @@ def _table(header: Iterable[str], lines: Iterable[Sequence[str]]) -> str:
     return buffer.getvalue()
 
 
-def _read(path: Path, needed: Iterable[str]) -> tuple[list[str], list[list[str]]]:
-    """Return the names of a table's columns and its rows, as text."""
-    from ...core.toml import read_text  # loads pydantic, not needed to write
-
-    lines = _lines(read_text(path))
-    names = next(lines, [])
-    missing = [name for name in needed if name not in names]
-    if missing:
-        raise ConfigError(
-            f"{path}: must have the column {missing[0]}; magbend vision extract "
-            "writes such a table"
-        )
-    return names, [cells for cells in lines if cells]
+def _read(path: Path, needed: tuple[str, ...]) -> Table:
+    table = read_table(path, comments="", limit_MB=1024.0, rows=False)
+    table.require(*needed, hint="magbend vision extract writes such a table")
+    return table
 
 
-def _lines(text: str) -> Iterator[list[str]]:
-    return csv.reader(io.StringIO(text))
+def _numbers(table: Table, name: str) -> Array:
+    """Return a column; NaN where a cell is empty, or there is no such column."""
+    if not table.has(name):
+        return np.full(len(table.rows), np.nan)
+    return table.numbers(name, blanks=True)
 
 
-def _by_image(
-    path: Path, names: Sequence[str], lines: Iterable[Sequence[str]],
-    wanted: Sequence[str],
-) -> dict[str, Array]:  # fmt: skip
-    """Return the wanted columns of each image, shape (n, len(wanted))."""
-    image, places = names.index("image"), [names.index(name) for name in wanted]
-    cells: dict[str, list[list[str]]] = {}
-    for line in lines:
-        if len(line) < len(names):
-            raise ConfigError(f"{path}: a row has {len(line)} of {len(names)} columns")
-        cells.setdefault(line[image], []).append([line[k] or "nan" for k in places])
-    try:
-        return {name: np.array(rows, np.float64) for name, rows in cells.items()}
-    except ValueError as error:
-        raise ConfigError(f"{path}: must hold numbers; instead {error}") from None
+def _by_image(table: Table, wanted: Sequence[str]) -> dict[str, dict[str, Array]]:
+    """Return the wanted columns of each image."""
+    columns = {name: _numbers(table, name) for name in wanted}
+    return {
+        image: {name: column[rows] for name, column in columns.items()}
+        for image, rows in _rows_of(table).items()
+    }
 
 
-def _number(path: Path, name: str, text: str) -> float:
-    try:
-        return float(text or "nan")
-    except ValueError:
-        raise ConfigError(
-            f"{path}: column {name} must hold numbers; instead received {text!r}"
-        ) from None
+def _rows_of(table: Table) -> dict[str, list[int]]:
+    rows: dict[str, list[int]] = {}
+    for i, image in enumerate(table.texts("image")):
+        rows.setdefault(image, []).append(i)
+    return rows
