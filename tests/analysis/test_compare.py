@@ -222,7 +222,7 @@ def test_spoilt_tables_are_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="must have the column"):
         load_run(path)
     (path / "centrelines.csv").write_bytes(b"\xff\xfe\x00broken")
-    with pytest.raises(StoreError, match="is not a text file"):
+    with pytest.raises(StoreError, match="is no text"):
         load_run(path)
     record = json.loads((path / "run.json").read_text())
     record["specimen"]["side_mm"] = -1.0

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.centreline import Centreline
+from ...core.errors import ConfigError
 from ...core.table import Table, read_table
 from ..camera.calibration import Calibration
 from ..measurement import DEVIATION_COLUMNS, NAN2, POINT_COLUMNS, Measurement, Pose
@@ -214,7 +215,9 @@ def read_centrelines(path: Path) -> dict[str, dict[str, Array]]:
 def read_edges(path: Path) -> dict[str, Array]:
     """Read an edge table: by image, as in `Done`."""
     table = _read(path, EDGE_HEADER)
-    sides = [float(SIDES.index(side)) for side in table.texts("side")]
+    sides = [float(SIDES.index(side)) for side in table.texts("side") if side in SIDES]
+    if len(sides) < len(table.rows):
+        raise ConfigError(f"{path}: the column side must hold left or right")
     columns = [np.array(sides), *(_numbers(table, name) for name in EDGE_HEADER[2:])]
     values = np.column_stack(columns)
     return {image: values[rows] for image, rows in _rows_of(table).items()}
