@@ -64,6 +64,9 @@ from .extraction.extract import (
 from .extraction.extract import (
     measure as measure,
 )
+from .extraction.follow import (
+    follow as follow,
+)
 from .extraction.setting import (
     Setting as Setting,
 )

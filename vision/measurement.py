@@ -98,6 +98,8 @@ class Measurement:
         Where the rod leaves the clamp, and the middle of its end face, in pixels.
     pose : Pose or None
         Where the specimen frame lies in the board frame; None without a calibration.
+    inverted : bool
+        Whether the rod is lighter than its ground.
     """
 
     status: Literal["ok", "failed"]
@@ -114,6 +116,7 @@ class Measurement:
     clamp_px: tuple[float, float] = NAN2
     tip_px: tuple[float, float] = NAN2
     pose: Pose | None = None
+    inverted: bool = False
 
     @property
     def ok(self) -> bool:

@@ -27,7 +27,7 @@ from .specimen_frame import measurement
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 
-_BROKEN = (
+BROKEN = (
     np.linalg.LinAlgError, ArithmeticError, ValueError, IndexError, cv2.error
 )  # fmt: skip
 """What numerics raise on pictures that hold no rod after all."""
@@ -78,7 +78,7 @@ def measure(photo: Photo, setting: Setting) -> Measurement:
         return failure(lost.flag, lost.reason)
     except MagbendError as error:
         return failure("calibration_mismatch", str(error))
-    except _BROKEN as error:
+    except BROKEN as error:
         return failure("not_measurable", f"the picture cannot be measured ({error})")
 
 
@@ -95,14 +95,44 @@ def _measure(photo: Photo, setting: Setting) -> Measurement:
         grey = np.asarray(cv2.GaussianBlur(grey, (0, 0), blur))
         soft = _start(grey, candidate, sign, blur)
         start = replace(soft, rough=True, width=start.width)
+    return finish(photo, grey, start, candidate, setting, sign=sign)
+
+
+def finish(
+    photo: Photo, grey: Image, start: Start, candidate: Candidate, setting: Setting, *,
+    sign: float, near: bool = False,
+) -> Measurement:  # fmt: skip
+    """Refine, judge and turn into mm what starts from a curve near the axis.
+
+    Parameters
+    ----------
+    photo, grey
+        The photograph, and its light as it is to be refined.
+    start, candidate
+        The curve, and what was found before it.
+    setting : Setting
+        What is known.
+    sign : float
+        -1 for a light rod.
+    near : bool
+        Whether the rod need not be sought any more; see `refine`.
+
+    Raises
+    ------
+    LostError
+        If there is nothing to vouch for.
+    """
     calibrated = setting.calibration is not None
     refined = refine(
         grey, start, root=candidate.root, sign=sign, joints=setting.joints_px,
-        walls=setting.walls_px if calibrated and not binary.inverted else None,
-        face_px=setting.face_px(start.curve),
+        walls=setting.walls_px if calibrated and sign > 0.0 else None,
+        face_px=setting.face_px(start.curve), near=near,
     )  # fmt: skip
+    if near and not refined.settled:
+        raise LostError("edges_lost", "the rod moved too far since the last frame")
     refusal(photo, refined, candidate)
     result = measurement(refined, candidate, setting)
+    result = replace(result, inverted=sign < 0.0)
     return doubts(result, photo, refined, candidate, setting)
 
 

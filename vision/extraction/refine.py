@@ -66,6 +66,8 @@ class Refined:
         Lines at the clamp; None for a rod that enters at the border or floats.
     rough : bool
         Whether its edges wander, as a yarn's.
+    settled : bool
+        Whether the last pass still moved nothing.
     """
 
     fit: CurveFit
@@ -76,6 +78,7 @@ class Refined:
     tip: EndFace
     clamp: ClampLines | None
     rough: bool
+    settled: bool = True
 
     @property
     def typical_width(self) -> float:
@@ -92,6 +95,7 @@ def refine(
     joints: Callable[[Curve], Sequence[float]] = lambda _curve: (),
     walls: Walls | None = None,
     face_px: float = 0.0,
+    near: bool = False,
 ) -> Refined:
     """Measure axis, edges and ends.
 
@@ -113,6 +117,8 @@ def refine(
         seen on the left.
     face_px : float
         How much of a clamp's face the camera may see, along the rod.
+    near : bool
+        Whether the start may be so near that no pass need only seek the rod.
 
     Raises
     ------
@@ -124,11 +130,15 @@ def refine(
     state = State(
         start.curve, half, start.width, 0.0, last, face_px, start.rough, start.blur
     )
-    seen, seeking = _look(grey, state, sign, 0, seeking=True), True
+    seen = _look(grey, state, sign, 0, seeking=not near)
+    if near and np.quantile(np.abs(seen.edges.middle[seen.good]), 0.95) > _NEAR_PX:
+        near = False
+        seen = _look(grey, state, sign, 0, seeking=True)
+    seeking, before = not near, int(near)
     tip, lines, first = find_ends(grey, state, seen, root, sign, 0, walls)
-    places, aside = None, np.inf
-    for turn in range(_PASSES):
-        if turn:
+    places, aside, settled = None, np.inf, False
+    for turn in range(before, _PASSES):
+        if turn > before:
             seen = _look(grey, state, sign, turn, seeking=seeking)
         if walls is not None:
             seen = to_wall_ends(state, seen, walls)
@@ -146,7 +156,8 @@ def refine(
         tip, lines, first = find_ends(grey, state, seen, root, sign, turn + 1, walls)
         moved = abs(first) + abs(tip.s - state.last)
         still = aside < _STILL_PX and moved < _ENDS_STILL_PX
-        if still and not seeking:
+        settled = still and not seeking
+        if settled:
             break
         seeking = seeking and turn + 1 < _SEEKING_PASSES and aside > _NEAR_PX
     curve = replace(fit.curve, s=fit.curve.s - first)
@@ -154,6 +165,7 @@ def refine(
         fit=replace(fit, curve=curve), shaded=shaded, good=used, width=width,
         sigma_width=sigma_width, tip=replace(tip, s=tip.s - first),
         clamp=None if lines is None else lines.shifted(first), rough=state.rough,
+        settled=settled,
     )  # fmt: skip
 
 

@@ -1,0 +1,91 @@
+"""A rod followed from frame to frame: as good as a full search, and never a ghost."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from magbend.vision import Setting, as_photo, extract, follow
+from magbend.vision.extraction import follow as follow_module
+from magbend.vision.synthetic import Light, curve, draw, signed_distance
+
+SIZE, AT = (900, 640), (180.0, 520.0)
+
+
+def frame(bend_deg, *, length_mm=30.0, at=AT, seed=0, **options):
+    return draw(
+        curve("graded", angle_deg=bend_deg, length_mm=length_mm),
+        np.random.default_rng(seed), px_per_mm=16.0, size_px=SIZE, clamp_px=at,
+        angle_deg=4.0, **options,
+    )  # fmt: skip
+
+
+SETTING = Setting(calibration=frame(0.0).truth.calibration)
+
+
+@pytest.fixture(scope="module")
+def first():
+    return follow(as_photo(frame(40.0).image), SETTING)
+
+
+def error_px(found, drawn):
+    distance = signed_distance(found.points_px, drawn.truth.points_px)
+    return float(np.sqrt(np.mean(distance**2)))
+
+
+def no_full_search(*_args):
+    raise AssertionError("the whole picture was searched")
+
+
+@pytest.mark.parametrize("bend_deg", [40.0, 41.0, 43.0])
+def test_a_rod_near_the_last_is_as_well_measured_as_by_a_full_search(
+    first, bend_deg, monkeypatch
+):
+    drawn = frame(bend_deg, seed=1)
+    photo = as_photo(drawn.image)
+    whole = extract(photo, SETTING.calibration)
+    monkeypatch.setattr(follow_module, "measure", no_full_search)
+    found = follow(photo, SETTING, first)
+    assert error_px(found, drawn) < 0.03
+    np.testing.assert_allclose(found.tip_px, whole.tip_px, atol=0.05)
+    assert found.pose.angle_deg == pytest.approx(whole.pose.angle_deg, abs=0.15)
+
+
+def test_a_rod_that_jumped_is_found_again(first):
+    drawn = frame(-60.0, at=(300.0, 200.0))
+    found = follow(as_photo(drawn.image), SETTING, first)
+    assert found.ok
+    assert error_px(found, drawn) < 0.03
+
+
+def test_another_rod_in_the_same_place_is_not_taken_for_the_last(first):
+    drawn = frame(40.0, length_mm=24.0)
+    found = follow(as_photo(drawn.image), SETTING, first)
+    assert found.length_mm == pytest.approx(24.0, abs=0.05)
+
+
+def test_an_empty_frame_has_no_rod_and_the_next_one_is_measured(first):
+    empty = as_photo(np.full(SIZE[::-1], 225, np.uint8))
+    lost = follow(empty, SETTING, first)
+    assert lost.flags == ("no_rod",)
+    again = follow(as_photo(frame(40.0).image), SETTING, lost)
+    assert again.ok
+
+
+def test_a_frame_of_another_size_is_refused(first):
+    other = as_photo(np.full((480, 640), 225, np.uint8))
+    assert follow(other, SETTING, first).flags == ("calibration_mismatch",)
+
+
+def test_light_rods_and_rods_from_the_border_are_followed(monkeypatch):
+    light = Light(paper=0.05, rod=0.8, clamp=0.5, shadow_depth=0.0)
+    for options in ({"light": light}, {"at": (0.0, 520.0), "clamp_height_mm": 0.0}):
+        one = follow(as_photo(frame(30.0, **options).image), SETTING)
+        assert one.ok, one.reason
+        drawn = frame(31.0, seed=2, **options)
+        with monkeypatch.context() as patch:
+            patch.setattr(follow_module, "measure", no_full_search)
+            found = follow(as_photo(drawn.image), SETTING, one)
+        assert found.ok
+        assert ("clamp_at_border" in found.flags) is ("at" in options)
+        assert abs(signed_distance(found.points_px, drawn.truth.points_px)).max() < 0.2

@@ -1,0 +1,122 @@
+"""One frame after the other: the last measurement tells where to look for the next.
+
+A camera that watches a bench takes the rod's next picture before it has gone far. So
+its edges are sought about the last axis, without a look at the rest of the picture;
+where they are not found there, or do not make the same rod, the whole picture is
+searched as if it were the first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ...core.errors import MagbendError
+from ..edge.state import LostError, Root
+from ..find.rod import Candidate
+from ..find.track import Start, start_curve
+from ..measurement import Measurement
+from ..picture.photo import Photo
+from .bare import flattened
+from .extract import BROKEN, finish, measure
+from .setting import Setting
+
+REACHES = 1.0, 3.0
+"""How far from the last axis the rod is sought, in its widths: first near, then far."""
+
+SAME_LENGTH, SAME_WIDTH = 0.04, 0.15
+"""By what part a rod may be longer or wider than in the last frame, at most."""
+
+
+def follow(
+    photo: Photo, setting: Setting, last: Measurement | None = None
+) -> Measurement:
+    """Measure a frame of a film or a live view.
+
+    Parameters
+    ----------
+    photo : Photo
+        The frame, in linear light.
+    setting : Setting
+        Calibration, and what else is known; the same for all frames.
+    last : Measurement, optional
+        What the frame before gave. Without it, and where the rod is not found near to
+        where it was, the whole picture is searched.
+
+    Returns
+    -------
+    Measurement
+        As of `measure`: failed, with flag and reason, where there is nothing to vouch
+        for.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from magbend.vision import Setting, as_photo, follow
+    >>> from magbend.vision.synthetic import curve, draw
+    >>> found = None
+    >>> for bend_deg in (20.0, 24.0):
+    ...     frame = draw(
+    ...         curve("arc", angle_deg=bend_deg), np.random.default_rng(0),
+    ...         clamp_px=(500.0, 600.0), angle_deg=0.0,
+    ...     )
+    ...     setting = Setting(calibration=frame.truth.calibration)
+    ...     found = follow(as_photo(frame.image), setting, found)
+    >>> round(found.tip_angle_deg)
+    24
+    """
+    if last is not None and last.ok:
+        try:
+            found = _near(photo, setting, last)
+        except (LostError, MagbendError):
+            found = None  # of another size; a full search says so
+        if found is not None:
+            return found
+    return measure(photo, setting)
+
+
+def _near(photo: Photo, setting: Setting, last: Measurement) -> Measurement | None:
+    """Return the same rod as found about the last axis; None where it is not."""
+    sign = -1.0 if last.inverted else 1.0
+    rod = Candidate(
+        points_px=last.points_px, width_px=last.width_px, length_px=last.length_px,
+        root=_root(last), contacts=1, ratio=0.0,
+    )  # fmt: skip
+    if setting.calibration is not None:
+        setting.calibration.check_size(*photo.size_px)
+    if setting.bare is not None:
+        photo = flattened(photo, setting.bare)
+    for reach in REACHES:
+        try:
+            start = _start(photo, rod, sign, reach)
+            if start is None:
+                continue
+            found = finish(photo, photo.grey, start, rod, setting, sign=sign, near=True)
+        except (LostError, *BROKEN):
+            continue
+        if found.ok and _same(found.length_px, found.width_px, last):
+            return found
+    return None
+
+
+def _start(photo: Photo, rod: Candidate, sign: float, reach: float) -> Start | None:
+    start = start_curve(
+        photo.grey, rod.points_px, reach * rod.width_px, sign=sign,
+        follow=rod.root == "clamp",
+    )  # fmt: skip
+    if start is None or start.rough:
+        return None
+    width, length = start.width / rod.width_px, start.curve.s[-1] / rod.length_px
+    if abs(width - 1.0) > SAME_WIDTH or abs(length - 1.0) > SAME_LENGTH:
+        return None
+    return replace(start, width=rod.width_px)
+
+
+def _root(last: Measurement) -> Root:
+    if "clamp_at_border" in last.flags:
+        return "border"
+    return "free" if "no_clamp" in last.flags else "clamp"
+
+
+def _same(length_px: float, width_px: float, last: Measurement) -> bool:
+    length, width = length_px / last.length_px - 1.0, width_px / last.width_px - 1.0
+    return abs(length) < SAME_LENGTH and abs(width) < SAME_WIDTH
