@@ -29,9 +29,11 @@ def group(name: str, help_text: str, example: str) -> typer.Typer:
     )
 
 
-def print_json(data: Any) -> None:
+def print_json(data: Any, *, indent: int | None = 2) -> None:
     """Print `data` as JSON; NaN becomes null, since JSON has no NaN."""
-    typer.echo(json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False))
+    typer.echo(
+        json.dumps(_plain(data), indent=indent, ensure_ascii=False, allow_nan=False)
+    )
 
 
 def _plain(value: Any) -> Any:

@@ -15,9 +15,7 @@ from ..core.errors import StoreError
 from .keys import answering
 
 if TYPE_CHECKING:
-    from ..rig.bench.config import Plan
-    from ..rig.bench.devices import Devices
-    from ..rig.clock import Clock
+    from ..rig import Clock, Devices, Owner, Plan, RunControl
 
 
 def needs_twin(plan: Plan) -> bool:
@@ -69,6 +67,7 @@ def open_bench(
     twin_seed: int | None,
     *,
     camera: bool = True,
+    control: RunControl | None = None,
 ) -> Iterator[Devices]:
     """Yield open devices; every byte of theirs goes to ``wire.log`` in `folder`.
 
@@ -85,10 +84,10 @@ def open_bench(
         a photograph of its calibration board as ``board.png``.
     camera : bool
         False where no picture is taken.
+    control : RunControl, optional
+        Of a run: callers may pause it and ask what it does.
     """
-    from ..rig.bench.open import open_devices
-    from ..rig.clock import SteppedClock, SystemClock
-    from ..rig.link import WireLog
+    from ..rig import SteppedClock, SystemClock, WireLog, open_devices, stopping
 
     clock: Clock = SystemClock() if twin_seed is None else SteppedClock()
     try:
@@ -96,7 +95,7 @@ def open_bench(
         log = WireLog(folder / "wire.log", clock)
     except OSError as error:
         raise StoreError(f"{folder}: cannot be written: {error.strerror}") from None
-    with contextlib.closing(log):
+    with contextlib.closing(log), _owner(plan, twin_seed, control) as owner:
         if twin_seed is None:
             devices = open_devices(
                 plan, clock, log=log, readings_mT=readings_mT, with_camera=camera,
@@ -106,7 +105,28 @@ def open_bench(
             from ..analysis.twin.run import open_twin_bench, photograph_board
 
             bench, devices = open_twin_bench(plan, seed=twin_seed, clock=clock, log=log)
+        owner.commands["stop"] = stopping(devices.stage)
         with contextlib.closing(devices):
             yield devices
         if twin_seed is not None and camera:
             photograph_board(bench, folder / "board.png")
+
+
+@contextlib.contextmanager
+def _owner(
+    plan: Plan, twin_seed: int | None, control: RunControl | None
+) -> Iterator[Owner]:
+    """Own the bench of a plan; a run may be paused by whoever asks."""
+    from ..rig import BenchState, owning
+
+    with owning(
+        plan.rig_path,
+        plan.rig.stage.port,
+        control.state if control else BenchState(),
+        command="rig run" if control else "rig scan-field",
+        computed=twin_seed is not None,
+    ) as owner:
+        if control:
+            owner.commands["pause"] = control.pause
+            owner.commands["resume"] = control.resume
+        yield owner

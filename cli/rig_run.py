@@ -76,9 +76,9 @@ def run(
 
     At each gap: approach, settle, measure the field, photograph.
 
-    Ctrl-C holds the stage and ends the run (again: at once); p pauses it, and so does
-    the signal USR1 or a file named pause in the run folder. What was recorded stays:
-    --resume homes the stage, checks its position and takes the missing steps.
+    Ctrl-C holds the stage and ends the run (again: at once); p pauses it, and so do
+    the signal USR1 and magbend rig pause. What was recorded stays: --resume homes the
+    stage, checks its position and takes the missing steps.
     """
     from ..rig.bench.config import read_plan
 
@@ -272,11 +272,11 @@ def _carry_out(
     from ..rig.runs.runner import run as carry_out
     from .keys import pausing, terminating
 
-    control = RunControl(folder)
+    control = RunControl()
     keys = not asks_flux(plan, readings_mT)
     with (
         terminating(),
-        open_bench(plan, folder, readings_mT, twin_seed) as devices,
+        open_bench(plan, folder, readings_mT, twin_seed, control=control) as devices,
         pausing(control, keys=keys),
         _watching(devices, live_port) as report,
         progress(plan.model.name) as tell,

@@ -11,20 +11,23 @@ import typer
 
 from .console import print_json
 from .keys import terminating
+from .rig_ask import (
+    RIG,
+    JsonOption,
+    PortOption,
+    RigOption,
+    owner_facts,
+    owner_screen,
+    stage_table,
+)
+from .rig_ask import watch as watch_owner
 
 if TYPE_CHECKING:
-    from ..rig.stage.config import StageConfig
     from ..rig.stage.gap import GapStage
 
-RigOption = Annotated[Path, typer.Option("--rig", help="The rig file.")]
-PortOption = Annotated[
-    str | None, typer.Option("--port", help="Instead of stage.port of the rig file.")
-]
 LogOption = Annotated[
     Path | None, typer.Option("--log", help="Append every byte to this file.")
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="For a machine.")]
-RIG = Path("rig.toml")
 
 
 def register(app: typer.Typer) -> None:
@@ -35,7 +38,6 @@ def register(app: typer.Typer) -> None:
         ("home", home, "home --rig rig.toml"),
         ("goto", goto, "goto 60 --rig rig.toml"),
         ("jog", jog, "jog --rig rig.toml"),
-        ("stop", stop, "stop --rig rig.toml"),
         ("unlock", unlock, "unlock --rig rig.toml"),
         ("set-gap", set_gap, "set-gap 70.2 --rig rig.toml"),
         ("twin", twin, "twin --state board.json"),
@@ -70,10 +72,22 @@ def status(
     ] = False,
     log: LogOption = None,
 ) -> None:
-    """Say where the stage is and how far it may go."""
+    """Say where the stage is and how far it may go.
+
+    Beside a run, or another command that holds the bench, say what that one does.
+    """
     import time
 
-    with _connected(rig, port, log) as stage:
+    held = owner_facts(rig, port)
+    if held is not None:
+        if watch:
+            watch_owner(rig, port, as_json)
+        elif as_json:
+            print_json(held)
+        else:
+            typer.echo(owner_screen(held))
+        return
+    with _connected("status", rig, port, log) as stage:
         if not watch:
             data = _facts(stage)
             print_json(data) if as_json else typer.echo(_screen(data))
@@ -95,7 +109,7 @@ def home(rig: RigOption = RIG, port: PortOption = None, log: LogOption = None) -
 
     A stock build homes Z first, then X and Y; Ctrl-C stops it at once.
     """
-    with _connected(rig, port, log) as stage:
+    with _connected("home", rig, port, log) as stage:
         typer.echo("homing; Ctrl-C stops it at once", err=True)
         with _told_how_to_go_on(stage):
             stage.home()
@@ -121,7 +135,7 @@ def goto(
     """
     import dataclasses
 
-    with _connected(rig, port, log) as stage:
+    with _connected("goto", rig, port, log) as stage:
         stage.check_gap(gap_mm)
         if feed_mm_min is not None:
             stage.check_feed(feed_mm_min)
@@ -146,20 +160,8 @@ def jog(rig: RigOption = RIG, port: PortOption = None, log: LogOption = None) ->
     """
     from .jog_keys import jog_loop
 
-    with _connected(rig, port, log) as stage:
+    with _connected("jog", rig, port, log) as stage:
         jog_loop(stage)
-
-
-def stop(rig: RigOption = RIG, port: PortOption = None) -> None:
-    """Stop the stage, also from another terminal.
-
-    A run or command that holds the port is told, and holds the stage.
-    """
-    from ..rig.clock import SystemClock
-    from ..rig.stage.stop_request import stop_from_outside
-
-    config, _ = _tables(rig, port)
-    typer.echo(stop_from_outside(config, SystemClock()))
 
 
 def unlock(
@@ -172,7 +174,7 @@ def unlock(
 
     This sends $X: the stage may not know where it is.
     """
-    with _connected(rig, port, log) as stage:
+    with _connected("unlock", rig, port, log) as stage:
         before = stage.status()
         if before.state != "alarm":
             typer.echo(f"the stage is not locked; it is {before.state}")
@@ -199,7 +201,7 @@ def set_gap(
     """
     from ..rig.bench.file_edit import replace_gap_at_zero
 
-    with _connected(rig, port, log) as stage:
+    with _connected("set-gap", rig, port, log) as stage:
         gap_at_zero_mm = stage.assume_gap(gap_mm)
         replace_gap_at_zero(rig, gap_at_zero_mm)
         typer.echo(f"{rig}: gap_at_zero_mm = {gap_at_zero_mm:.3f}")
@@ -231,41 +233,38 @@ def twin(
         save_board(board, state)
 
 
-def _tables(rig: Path, port: str | None) -> tuple[StageConfig, Any]:
-    from ..core.errors import ConfigError
-    from ..rig.bench.config import read_rig
-
-    if not rig.exists():
-        raise ConfigError(
-            f"{rig}: there is no such file; name yours with --rig, or write one: "
-            "magbend rig init"
-        )
-    model = read_rig(rig)
-    config = model.stage
-    if port:
-        config = config.model_copy(update={"port": port})
-    return config, model.limits
-
-
 @contextlib.contextmanager
-def _connected(rig: Path, port: str | None, log: Path | None) -> Iterator[GapStage]:
-    from ..rig.clock import SystemClock
-    from ..rig.link import WireLog
-    from ..rig.stage.gap import GapStage
-    from ..rig.stage.make import make_stage
+def _connected(
+    command: str, rig: Path, port: str | None, log: Path | None
+) -> Iterator[GapStage]:
+    """Yield the stage, connected; whoever asks is told that `command` holds it."""
+    from ..rig import (
+        BenchState,
+        GapStage,
+        SystemClock,
+        WireLog,
+        make_stage,
+        owning,
+        read_rig,
+        stopping,
+    )
 
-    config, bounds = _tables(rig, port)
+    config = stage_table(rig, port)
+    bounds = read_rig(rig).limits
     clock = SystemClock()
-    wire = WireLog(log, clock) if log else None
-    stage = GapStage(make_stage(config, clock, log=wire), config, bounds, clock)
-    try:
-        with terminating():
-            stage.connect()
-            yield stage
-    finally:
-        stage.close()
+    with contextlib.ExitStack() as opened:
+        owner = opened.enter_context(
+            owning(rig, config.port, BenchState(), command=f"rig {command}")
+        )
+        wire = WireLog(log, clock) if log else None
         if wire:
-            wire.close()
+            opened.callback(wire.close)
+        stage = GapStage(make_stage(config, clock, log=wire), config, bounds, clock)
+        opened.callback(stage.close)
+        owner.commands["stop"] = stopping(stage)
+        opened.enter_context(terminating())
+        stage.connect()
+        yield stage
 
 
 @contextlib.contextmanager

@@ -28,6 +28,12 @@ from .clock import (
 from .clock import (
     SystemClock as SystemClock,
 )
+from .control.client import NobodyError as NobodyError
+from .control.client import ask as ask
+from .control.client import watch as watch
+from .control.owner import Owner as Owner
+from .control.owner import owning as owning
+from .control.state import BenchState as BenchState
 from .errors import AlarmError as AlarmError
 from .errors import InterlockError as InterlockError
 from .errors import LinkLostError as LinkLostError
@@ -43,6 +49,7 @@ from .ports import (
 from .ports import (
     list_ports as list_ports,
 )
+from .runs.control import RunControl as RunControl
 from .runs.read import (
     Run as Run,
 )
@@ -85,3 +92,4 @@ from .stage.marlin.stage import (
 from .stage.protocol import (
     Stage as Stage,
 )
+from .stage.stop_request import stopping as stopping

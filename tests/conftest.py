@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 import signal
+<<<<<<< HEAD
 import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))  # for `house`
+=======
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+>>>>>>> a2f95aa (Own a bench through one control socket)
 
 
 def pytest_configure() -> None:
@@ -16,3 +24,14 @@ def pytest_configure() -> None:
     be inherited by both.
     """
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(autouse=True)
+def system_temp(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Give each test a system folder of its own for control sockets.
+
+    A short one: the path of a Unix socket has some hundred characters at most.
+    """
+    with tempfile.TemporaryDirectory(prefix="mb-") as folder:
+        monkeypatch.setattr("magbend.rig.control.names._SYSTEM_TEMP", Path(folder))
+        yield Path(folder)

@@ -1,14 +1,14 @@
-"""Pause and resume a run from outside: a key, a signal, or a file in its folder."""
+"""Pause and resume a run from outside, and tell what it does."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from pathlib import Path
 
+from ...core.errors import RigError
 from ..clock import Check, go_on
+from ..control.state import BenchState
 
-PAUSE_FILE = "pause"
 _POLL_S = 0.05
 
 Report = Callable[[str], None]
@@ -20,29 +20,55 @@ def quiet(_line: str) -> None:
 
 
 class RunControl:
-    """What people can ask of a run while it goes.
+    """What people can ask of a run while it goes, and what it tells them.
 
-    `toggle_pause` may be called from a signal handler or another thread; a file named
-    ``pause`` in the run folder does the same from another terminal. The run stops at
-    the next safe point: before a move, or before the photographs of a step.
+    `toggle_pause` may be called from a signal handler or another thread. The run stops
+    at the next safe point: before a move, or before the photographs of a step.
+
+    Attributes
+    ----------
+    state : BenchState
+        What the run does just now, for ``magbend rig status`` and ``watch``.
     """
 
-    def __init__(self, folder: Path | None = None) -> None:
-        self._folder = folder
-        self._asked = threading.Event()
+    def __init__(self) -> None:
+        self.state = BenchState()
+        self._is_asked = False  # no Event: its lock may be held under a signal
 
     @property
     def is_paused(self) -> bool:
         """Whether a pause is asked for."""
-        has_file = self._folder is not None and (self._folder / PAUSE_FILE).exists()
-        return self._asked.is_set() or has_file
+        return self._is_asked
 
     def toggle_pause(self) -> None:
         """Ask for a pause, or take the request back."""
-        if self._asked.is_set():
-            self._asked.clear()
-        else:
-            self._asked.set()
+        self._is_asked = not self._is_asked
+
+    def pause(self) -> str:
+        """Ask for a pause; return what happens, in a sentence.
+
+        Raises
+        ------
+        RigError
+            If it was asked for already.
+        """
+        if self._is_asked:
+            raise RigError("the run is paused already; magbend rig resume goes on")
+        self._is_asked = True
+        return "the run pauses before its next move or photograph"
+
+    def resume(self) -> str:
+        """Let the run go on; return what happens, in a sentence.
+
+        Raises
+        ------
+        RigError
+            If it is not paused.
+        """
+        if not self._is_asked:
+            raise RigError("the run is not paused")
+        self._is_asked = False
+        return "the run goes on"
 
     def wait_while_paused(self, report: Report, *, check: Check = go_on) -> bool:
         """Wait until nobody asks for a pause; return whether there was one.
@@ -51,10 +77,15 @@ class RunControl:
         """
         if not self.is_paused:
             return False
-        report("\apaused: press p again, or remove the file named pause, to go on")
+        before = self.state.now()["state"]
+        self.state.stand_still()
+        self.state.tell(state="paused")
+        report("\apaused: press p again, or magbend rig resume, to go on")
         tick = threading.Event()
         while self.is_paused:
             check()
             tick.wait(_POLL_S)
+        self.state.go_on()
+        self.state.tell(state=before)
         report("going on")
         return True

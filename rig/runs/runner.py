@@ -31,6 +31,7 @@ from .read import is_run, read_run
 from .records import Record, image_name
 from .resume_check import verify_position
 from .settle import Settled, settle
+from .time_left import TimeLeft
 
 logger = logging.getLogger(__name__)
 
@@ -119,7 +120,8 @@ def run(
             folder = RunFolder.reopen(out)
         else:
             folder = RunFolder.create(out, manifest, plan.text)
-        control = control or RunControl(out)
+        control = control or RunControl()
+        _introduce(control, plan, out)
         session = _Session(plan, devices, folder, control, report, received)
         status, reason = session.carry_out(is_resumed, progress)
     return RunSummary(
@@ -144,6 +146,7 @@ class _Session:
         self.devices = devices
         self.folder = folder
         self.control = control
+        self.state = control.state
         self.report = report
         self.received = received
         self.flagged: list[str] = []
@@ -174,13 +177,13 @@ class _Session:
         stage = self.devices.stage
         needs_home = is_resumed and self.plan.rig.stage.homing != "manual"
         if needs_home or stage.position_state != "homed":
-            self.report("homing the stage")
+            self._say("homing", "homing the stage")
             stage.home()
         if is_resumed and self.folder.done:
             steps = read_run(self.folder.path).steps
             last = steps[-1]
             self.reference_brightness = steps[0].get("brightness")
-            self.report(f"checking the position at {last['gap_mm']:g} mm")
+            self._say("checking", f"checking the position at {last['gap_mm']:g} mm")
             check = verify_position(
                 self.plan, self.devices, self.folder.path, last, check=self._check
             )
@@ -189,24 +192,37 @@ class _Session:
     def _take_steps(self, progress: Progress) -> None:
         gaps_mm = self.plan.gaps_mm
         progress(len(self.folder.done), len(gaps_mm))
+        left = TimeLeft(self.plan, self.folder.done)
+        self.state.expect_end(left.now_s())
         for index, gap_mm in enumerate(gaps_mm):
             if index in self.folder.done:
                 continue
             record = self._take_step(index, gap_mm)
             self.flagged += [f"step {index}: {flag}" for flag in record["flags"]]
-            self.report(_step_line(record, len(gaps_mm)))
+            self.state.expect_end(left.after(index))
+            self.state.tell(
+                gap_mm=record["gap_reached_mm"],
+                flux_mT=record["flux_mT"],
+                flags=record["flags"],
+                picture=str(self.folder.path.resolve() / image_name(index)),
+            )
+            self._say("idle", _step_line(record, len(gaps_mm)))
             progress(len(self.folder.done), len(gaps_mm))
 
     def _take_step(self, index: int, gap_mm: float) -> Record:
         devices, plan = self.devices, self.plan
+        self.state.tell(step=index + 1, state="moving")
         was_paused = self._pause()
         move = devices.stage.goto_gap(gap_mm)
         devices.camera.at_step(index, gap_mm)
+        self.state.tell(state="settling", gap_mm=move.gap_mm)
         was_paused = self._pause() or was_paused
         settled = settle(devices.camera, devices.clock, plan.settle, check=self._check)
+        self.state.tell(state="measuring")
         flux = devices.meter.read_flux(
             plan.model.flux.samples, gap_mm=gap_mm, check=self._check
         )
+        self.state.tell(state="photographing")
         frame = grab_median(
             devices.camera, devices.clock, plan.model.photograph.frames,
             check=self._check,
@@ -244,6 +260,10 @@ class _Session:
         return self.folder.commit_step(
             record, {image_name(index): encode_png(frame.image)}
         )
+
+    def _say(self, state: str, line: str) -> None:
+        self.state.tell(state=state, line=line)
+        self.report(line)
 
     def _pause(self) -> bool:
         return self.control.wait_while_paused(self.report, check=self._check)
@@ -285,8 +305,9 @@ class _Session:
             logger.warning("%s", error)
             if status == "success":
                 raise
+        self.state.tell(status=status, reason=reason)
         if status == "abort" and self.plan.model.abort.policy == "retract":
-            self.report("retracting from the magnet")
+            self._say("retracting", "retracting from the magnet")
             with _best_effort("retracting"), contextlib.suppress(KeyboardInterrupt):
                 stage.abort("retract")
         return reason
@@ -301,6 +322,12 @@ class _Session:
                     return
             except KeyboardInterrupt:
                 continue
+
+
+def _introduce(control: RunControl, plan: Plan, out: Path) -> None:
+    control.state.tell(
+        name=plan.model.name, folder=str(out.resolve()), steps=len(plan.gaps_mm)
+    )
 
 
 @contextlib.contextmanager

@@ -57,6 +57,7 @@ class SerialStage(ABC, Generic[Session]):
         self._identity: StageIdentity | None = None
         self._limits: StageLimits | None = None
         self._trust = PositionTrust()
+        self._is_stop_asked = False  # no Event: its lock may be held under a signal
 
     @property
     def position_state(self) -> PositionState:
@@ -143,7 +144,7 @@ class SerialStage(ABC, Generic[Session]):
         )
         link.open()
         self._link, self._presence = link, Presence(port)
-        self._presence.claim()
+        self._is_stop_asked = False
         try:
             self._session = self._meet(link)
         except BaseException:
@@ -157,9 +158,8 @@ class SerialStage(ABC, Generic[Session]):
     def _let_go(self) -> None:
         if self._link:
             self._link.close()
-        if self._presence:
-            self._presence.release()
         self._link = self._session = self._presence = None
+        self._is_stop_asked = False
 
     def _require_session(self) -> Session:
         if self._session is None:
@@ -174,17 +174,15 @@ class SerialStage(ABC, Generic[Session]):
     # --- stop requests --------------------------------------------------------
 
     def stop_requested(self) -> bool:
-        """Return whether another process asks this one to stop the stage."""
-        return self._presence is not None and self._presence.stop_asked()
+        """Return whether somebody asks this process to stop the stage."""
+        return self._is_stop_asked
 
     def request_stop(self) -> None:
         """Ask the thread that moves the stage to hold; safe from any thread."""
-        if self._presence is not None:
-            self._presence.ask_to_stop()
+        self._is_stop_asked = self._link is not None
 
     def _stop_is_met(self) -> None:
-        if self._presence is not None:
-            self._presence.clear_stop()
+        self._is_stop_asked = False
 
     def _hold_if_asked(self) -> None:
         if self.stop_requested():

@@ -1,26 +1,79 @@
-"""Stop a stage from another process than the one that drives it."""
+"""Stop a stage from another process than the one that drives it.
+
+The process that drives it is asked through its control socket; where none does, a feed
+hold is sent to the board.
+"""
 
 from __future__ import annotations
 
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
 from ...core.errors import StageError
 from ..clock import Clock
+<<<<<<< HEAD
 from ..errors import StageTimeoutError
+=======
+from ..control.client import NobodyError, ask
+>>>>>>> a2f95aa (Own a bench through one control socket)
 from ..link import Link
 from ..ports import resolve_port
 from .config import StageConfig
 from .grbl.motion import await_stand, stands
 from .grbl.protocol import FEED_HOLD
 from .grbl.session import GrblSession
+<<<<<<< HEAD
 from .presence import Presence
+=======
+from .protocol import StageTimeoutError
+>>>>>>> a2f95aa (Own a bench through one control socket)
 
 _STOP_S = 15.0
+_POLL_S = 0.02
 
 
-def stop_from_outside(config: StageConfig, clock: Clock) -> str:
+class Stoppable(Protocol):
+    """A stage that another thread may ask to stop."""
+
+    def request_stop(self) -> None:
+        """Ask the thread that moves the stage to hold."""
+        ...
+
+    def stop_requested(self) -> bool:
+        """Return whether a stop is asked for and not met."""
+        ...
+
+
+def stopping(stage: Stoppable) -> Callable[[], str]:
+    """Return what the owner of a stage does when a caller asks it to stop.
+
+    The request is met by the thread that drives the stage, which looks ten times a
+    second; the caller waits until it stands.
+    """
+
+    def stop() -> str:
+        stage.request_stop()
+        deadline_s = time.monotonic() + _STOP_S
+        while stage.stop_requested():
+            if time.monotonic() > deadline_s:
+                raise StageTimeoutError(
+                    f"process {os.getpid()} does not react: it is not moving the stage "
+                    f"just now; the request stays until its next move"
+                )
+            time.sleep(_POLL_S)
+        return f"process {os.getpid()} was told and has stopped the stage"
+
+    return stop
+
+
+def stop_from_outside(rig_file: Path, config: StageConfig, clock: Clock) -> str:
     """Stop a stage from another process than the one that drives it.
 
-    If a process holds the port, it is asked to hold (it looks ten times a second);
-    else the port is opened and a feed hold is sent.
+    If a process holds the bench, it is asked to hold; else the port is opened and a
+    feed hold is sent.
 
     Returns
     -------
@@ -29,27 +82,14 @@ def stop_from_outside(config: StageConfig, clock: Clock) -> str:
 
     Raises
     ------
-    StageError
+    RigError
         If the owner does not react, or the stage does not answer.
     """
-    port = resolve_port(config.port)
-    presence = Presence(port)
-    owner = presence.owner()
-    if owner is None:
-        return _hold_directly(config, port, clock)
-    presence.ask_to_stop()
-    deadline_s = clock.monotonic_s() + _STOP_S
-    while presence.stop_asked():
-        if presence.owner() is None:
-            presence.clear_stop()
-            return _hold_directly(config, port, clock)
-        if clock.monotonic_s() > deadline_s:
-            raise StageTimeoutError(
-                f"process {owner} holds {port} and does not react: it is not moving "
-                "the stage just now; the request stays until its next move"
-            )
-        clock.sleep(0.05)
-    return f"process {owner} was told and has stopped the stage"
+    try:
+        answer = ask(rig_file, "stop", port=config.port)
+    except NobodyError:
+        return _hold_directly(config, resolve_port(config.port), clock)
+    return str(answer["text"])
 
 
 def _hold_directly(config: StageConfig, port: str, clock: Clock) -> str:

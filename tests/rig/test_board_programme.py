@@ -23,11 +23,6 @@ from .board_programme import Programme
 from .stage_bench import SETTINGS
 
 
-@pytest.fixture(autouse=True)
-def runtime_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("MAGBEND_RUNTIME_DIR", str(tmp_path))
-
-
 @pytest.mark.parametrize(
     ("settings", "may_home"),
     [(SETTINGS, True), ({22: 0, 20: 0, 21: 0}, False)],

@@ -8,12 +8,15 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from magbend.cli.main import app
 from magbend.core.errors import ConfigError, MagbendError
+
+ISOLATED = Path(__file__).with_name("isolated.py")
 
 RIG = """
 [stage]
@@ -32,7 +35,6 @@ driver = "manual"
 
 @pytest.fixture(autouse=True)
 def bench_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("MAGBEND_RUNTIME_DIR", str(tmp_path))
     monkeypatch.chdir(tmp_path)
     (tmp_path / "rig.toml").write_text(RIG)
     return tmp_path
@@ -105,7 +107,7 @@ needs_pty = pytest.mark.skipif(os.name != "posix", reason="needs pseudo-terminal
 
 
 @pytest.fixture
-def moving(bench_folder):
+def moving(bench_folder, system_temp):
     """A process in the middle of a slow move, on a pseudo-terminal."""
     from magbend.rig.clock import SystemClock
     from magbend.rig.virtual.board.firmware import GrblBoard
@@ -119,7 +121,7 @@ def moving(bench_folder):
         rig("home", "--port", served.port)
         words = ["rig", "goto", "60", "--port", served.port]
         process = subprocess.Popen(
-            [sys.executable, "-m", "magbend.cli.main", *words],
+            [sys.executable, str(ISOLATED), str(system_temp), *words],
             stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
         deadline = time.monotonic() + 30.0

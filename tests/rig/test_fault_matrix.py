@@ -142,11 +142,6 @@ CELLS: dict[str, tuple[Callable[[Rig], object], str, str]] = {
 }  # fmt: skip
 
 
-@pytest.fixture(autouse=True)
-def runtime_folder(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setenv("MAGBEND_RUNTIME_DIR", str(tmp_path))
-
-
 def mend_and_resume(rig: Rig, out: Path) -> None:
     """Mend everything, open fresh devices on the same stage, resume to the end."""
     before = read_run(out).steps

@@ -17,11 +17,6 @@ from magbend.rig.virtual.bench import open_twin
 from .twin_run import render
 
 
-@pytest.fixture(autouse=True)
-def runtime_folder(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setenv("MAGBEND_RUNTIME_DIR", str(tmp_path))
-
-
 def with_fault(plan_file: Path, *rows: str) -> Path:
     rig_file = plan_file.with_name("rig.toml")
     tables = "".join(f"\n[[twin.fault]]\n{row}\n" for row in rows)

@@ -16,11 +16,6 @@ from magbend.rig.virtual.board.plant import Plant
 from .stage_bench import SETTINGS, homed_bench, make_bench
 
 
-@pytest.fixture(autouse=True)
-def runtime_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("MAGBEND_RUNTIME_DIR", str(tmp_path))
-
-
 @pytest.mark.parametrize("gap_mm", [44.0, 44.999, 0.0, -5.0, 118.1, 500.0])
 def test_a_forbidden_gap_is_refused_before_a_byte_is_sent(gap_mm):
     bench = homed_bench()

@@ -23,11 +23,6 @@ from .stage_bench import SETTINGS, homed_bench, interrupt, make_bench
 HOMING = {str(n): f"{v:g}" for n, v in (dict(DEFAULTS) | SETTINGS).items()}
 
 
-@pytest.fixture(autouse=True)
-def runtime_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("MAGBEND_RUNTIME_DIR", str(tmp_path))
-
-
 def _config(**options) -> StageConfig:
     return StageConfig(gap_at_zero_mm=120.0, **options)
 

@@ -11,11 +11,6 @@ from magbend.rig.virtual.board.plant import Plant
 from .stage_bench import SETTINGS, homed_bench, make_bench
 
 
-@pytest.fixture(autouse=True)
-def runtime_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("MAGBEND_RUNTIME_DIR", str(tmp_path))
-
-
 @pytest.mark.parametrize(
     ("settings", "config", "named"),
     [

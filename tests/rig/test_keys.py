@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 import types
+from pathlib import Path
 
 import pytest
 
@@ -17,6 +18,7 @@ from magbend.cli.keyboard import END, Keyboard
 needs_pty = pytest.mark.skipif(not hasattr(os, "openpty"), reason="needs POSIX")
 
 
+ISOLATED = str(Path(__file__).with_name("isolated.py"))
 TAKE_TERMINAL = """
 import os, sys
 os.open(os.ttyname(0), os.O_RDWR)
@@ -38,7 +40,6 @@ class Terminal:
             [sys.executable, "-c", TAKE_TERMINAL, *words],
             stdin=slave, stdout=slave, stderr=slave,
             start_new_session=True, cwd=folder,
-            env=os.environ | {"MAGBEND_RUNTIME_DIR": str(folder)},
         )  # fmt: skip
         os.close(slave)
 
@@ -112,9 +113,9 @@ max_gap_mm = 118.0
 
 
 @needs_pty
-def test_a_session_of_jogging_by_keys(terminal, tmp_path):
+def test_a_session_of_jogging_by_keys(terminal, tmp_path, system_temp):
     (tmp_path / "rig.toml").write_text(RIG.format(speed=25))
-    screen = terminal("-m", "magbend.cli.main", "rig", "jog")
+    screen = terminal(ISOLATED, str(system_temp), "rig", "jog")
     screen.wait_for("gap unknown  alarm unknown  step 1 mm")
     screen.type("\x1b[A")
     screen.wait_for("press H to home")
@@ -131,9 +132,9 @@ def test_a_session_of_jogging_by_keys(terminal, tmp_path):
 
 
 @needs_pty
-def test_space_stops_a_jog_and_ctrl_c_leaves(terminal, tmp_path):
+def test_space_stops_a_jog_and_ctrl_c_leaves(terminal, tmp_path, system_temp):
     (tmp_path / "rig.toml").write_text(RIG.format(speed=4))
-    screen = terminal("-m", "magbend.cli.main", "rig", "jog")
+    screen = terminal(ISOLATED, str(system_temp), "rig", "jog")
     screen.wait_for("alarm unknown")
     screen.type("H")
     screen.wait_for("homing")
@@ -195,13 +196,13 @@ def test_keys_of_windows_have_the_same_names(windows_keys):
     assert none == ""
 
 
-def test_the_pause_key_works_on_windows(windows_keys, monkeypatch, tmp_path):
+def test_the_pause_key_works_on_windows(windows_keys, monkeypatch):
     from magbend.cli.keys import pausing
     from magbend.rig.runs.control import RunControl
 
     for stream in (sys.stdin, sys.stderr):
         monkeypatch.setattr(stream, "isatty", lambda: True, raising=False)
-    control = RunControl(tmp_path)
+    control = RunControl()
     with pausing(control, keys=True):
         windows_keys.append("p")
         deadline_s = time.monotonic() + 5.0

@@ -23,11 +23,6 @@ from .stage_bench import make_bench
 posix = pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX")
 
 
-@pytest.fixture(autouse=True)
-def runtime_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("MAGBEND_RUNTIME_DIR", str(tmp_path))
-
-
 @pytest.fixture
 def twin():
     clock, board = SteppedClock(), GrblBoard()
@@ -136,18 +131,6 @@ def test_the_same_code_talks_through_a_pseudo_terminal():
         with pytest.raises(LinkLostError):
             link.write(b"?")
     assert "[VER:1.1h.20190830:]" in lines
-
-
-def test_a_stop_request_reaches_the_owner_and_dies_with_the_claim():
-    owner, outside = Presence("/dev/ttyTEST"), Presence("/dev/ttyTEST")
-    assert outside.owner() is None
-    owner.claim()
-    assert outside.owner() == os.getpid()
-    outside.ask_to_stop()
-    assert owner.stop_asked()
-    owner.release()
-    assert not outside.stop_asked()
-    assert outside.owner() is None
 
 
 def test_a_remembered_place_is_told_once():

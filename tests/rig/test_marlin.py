@@ -102,7 +102,6 @@ class MarlinBoard:
 
 @pytest.fixture
 def bench(tmp_path, monkeypatch):
-    monkeypatch.setenv("MAGBEND_RUNTIME_DIR", str(tmp_path))
     clock, board = InterruptingClock(), MarlinBoard()
     config = StageConfig(
         driver="marlin", port=register_board("marlin", board, clock),

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
@@ -29,11 +28,6 @@ from .stage_bench import InterruptingClock
 
 SEEDS = range(5)
 _NAMES = itertools.count()
-
-
-@pytest.fixture(autouse=True)
-def runtime_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("MAGBEND_RUNTIME_DIR", str(tmp_path))
 
 
 def stage_on(board: RecordedBoard, homing: str = "manual") -> GrblStage:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from magbend.core.errors import StoreError
+from magbend.core.errors import RigError, StoreError
 from magbend.rig.bench.config import read_plan
 from magbend.rig.errors import AlarmError, LinkLostError
 from magbend.rig.runs.control import RunControl
@@ -104,8 +104,8 @@ def test_a_run_can_fail_and_resume_many_times(make_bench, tmp_path: Path) -> Non
     assert verify_run(out) == []
 
 
-def test_a_pause_file_and_the_key_hold_the_run(tmp_path: Path) -> None:
-    control = RunControl(tmp_path)
+def test_a_caller_and_the_key_hold_the_run() -> None:
+    control = RunControl()
     lines: list[str] = []
 
     def report(line: str) -> None:
@@ -116,14 +116,18 @@ def test_a_pause_file_and_the_key_hold_the_run(tmp_path: Path) -> None:
     control.toggle_pause()
     assert control.wait_while_paused(lambda line: report(line) if not lines else None)
     assert lines[0].startswith("\apaused")
-    (tmp_path / "pause").touch()
+    control.pause()
     assert control.is_paused
-    (tmp_path / "pause").unlink()
+    with pytest.raises(RigError, match="paused already"):
+        control.pause()
+    control.resume()
     assert not control.is_paused
+    with pytest.raises(RigError, match="not paused"):
+        control.resume()
 
 
 def test_a_paused_step_says_so(bench, tmp_path: Path) -> None:
-    control = RunControl(tmp_path / "out")
+    control = RunControl()
     control.toggle_pause()
 
     def report(line: str) -> None:

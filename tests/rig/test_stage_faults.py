@@ -22,11 +22,6 @@ from .stage_bench import StageBench, homed_bench, interrupt, make_bench
 Fault = Callable[[StageBench], None]
 
 
-@pytest.fixture(autouse=True)
-def runtime_folder(tmp_path, monkeypatch):
-    monkeypatch.setenv("MAGBEND_RUNTIME_DIR", str(tmp_path))
-
-
 def _later(action: Callable[[StageBench], object], after_s: float = 2.0) -> Fault:
     return lambda bench: bench.later(after_s, lambda: action(bench) and None)
 

@@ -1,0 +1,1 @@
+"""One control socket for the process that owns a bench: ask, stop, pause, watch."""
