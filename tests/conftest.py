@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import signal
-<<<<<<< HEAD
 import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parent))  # for `house`
-=======
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
->>>>>>> a2f95aa (Own a bench through one control socket)
+
+sys.path.insert(0, str(Path(__file__).parent))  # for `house`
 
 
 def pytest_configure() -> None:

@@ -14,22 +14,14 @@ from typing import Protocol
 
 from ...core.errors import StageError
 from ..clock import Clock
-<<<<<<< HEAD
-from ..errors import StageTimeoutError
-=======
 from ..control.client import NobodyError, ask
->>>>>>> a2f95aa (Own a bench through one control socket)
+from ..errors import StageTimeoutError
 from ..link import Link
 from ..ports import resolve_port
 from .config import StageConfig
 from .grbl.motion import await_stand, stands
 from .grbl.protocol import FEED_HOLD
 from .grbl.session import GrblSession
-<<<<<<< HEAD
-from .presence import Presence
-=======
-from .protocol import StageTimeoutError
->>>>>>> a2f95aa (Own a bench through one control socket)
 
 _STOP_S = 15.0
 _POLL_S = 0.02

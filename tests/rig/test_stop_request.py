@@ -8,16 +8,10 @@ import pytest
 
 from magbend.core.errors import ConfigError, RigError
 from magbend.rig.bench.file_edit import replace_gap_at_zero
-<<<<<<< HEAD
-from magbend.rig.errors import StageTimeoutError
-from magbend.rig.stage.presence import Presence
-from magbend.rig.stage.stop_request import stop_from_outside
-=======
 from magbend.rig.control.owner import owning
 from magbend.rig.control.state import BenchState
 from magbend.rig.stage import stop_request
 from magbend.rig.stage.stop_request import stop_from_outside, stopping
->>>>>>> a2f95aa (Own a bench through one control socket)
 
 from .stage_bench import homed_bench
 
