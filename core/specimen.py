@@ -1,17 +1,35 @@
-"""The specimen: a straight rod of sections, root first (a GMC, or any other)."""
+"""The specimen: a rod of sections, root first (a GMC, or any other)."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
-from .checks import finite, listed, positive, shown, size, store
+from .checks import finite, listed, positive, shown, size, store, within
+from .cross_section import ALL_SIZES, SIZES, CrossSection, cross_section
 from .errors import InputError
+
+SIGNED = {
+    "remanence_mT": "mT",
+    "remanence_y_mT": "mT",
+    "remanence_z_mT": "mT",
+    "natural_curvature_per_mm": "1/mm",
+}
+"""Numbers of either sign that a rod has and a section may have of its own."""
+DEVIATIONS = {
+    "side_sd_mm": "mm",
+    "length_sd_mm": "mm",
+    "remanence_sd_mT": "mT",
+    "density_sd_kg_m3": "kg/m3",
+    "natural_curvature_sd_per_mm": "1/mm",
+}
+"""Standard deviations that a specimen may state, and their units."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """One section of the rod.
+    """One section of the rod; what is not given is that of the whole rod.
 
     Parameters
     ----------
@@ -19,23 +37,33 @@ class Section:
         Length along the rod, in mm.
     E_MPa : float
         Young's modulus, in MPa.
-    side_mm : float, optional
-        Side of the square cross-section in mm, where it differs from the specimen's.
+    side_mm, width_mm, height_mm, diameter_mm, bore_mm : float, optional
+        Sizes of the cross-section in mm, those that the rod's shape is given by.
     remanence_mT : float, optional
-        Axial remanence in mT, signed (+ points root to tip), where it differs from the
-        specimen's.
+        Remanence along the axis in mT, signed (+ points root to tip).
+    remanence_y_mT, remanence_z_mT : float, optional
+        Remanence across the axis, along the rod's own y and z, in mT.
+    natural_curvature_per_mm : float, optional
+        Curvature of the stress-free rod in its xy plane, in 1/mm; + bends toward +y.
 
     Raises
     ------
     InputError
-        If a length, modulus or side is not a finite number above zero, or the
-        remanence is not finite.
+        If a length, modulus or size is not a finite number above zero, or another
+        number is not finite.
     """
 
     length_mm: float
     E_MPa: float
     side_mm: float | None = None
     remanence_mT: float | None = None
+    width_mm: float | None = None
+    height_mm: float | None = None
+    diameter_mm: float | None = None
+    bore_mm: float | None = None
+    remanence_y_mT: float | None = None
+    remanence_z_mT: float | None = None
+    natural_curvature_per_mm: float | None = None
 
     def __post_init__(self) -> None:
         store(
@@ -43,11 +71,12 @@ class Section:
             length_mm=size(self.length_mm, "section length_mm", "mm"),
             E_MPa=size(self.E_MPa, "section E_MPa", "MPa"),
         )
-        if self.side_mm is not None:
-            store(self, side_mm=size(self.side_mm, "section side_mm", "mm"))
-        if self.remanence_mT is not None:
-            remanence = finite(self.remanence_mT, "section remanence_mT", "mT")
-            store(self, remanence_mT=remanence)
+        for name in ALL_SIZES:
+            if (given := getattr(self, name)) is not None:
+                store(self, **{name: size(given, f"section {name}", "mm")})
+        for name, unit in SIGNED.items():
+            if (given := getattr(self, name)) is not None:
+                store(self, **{name: finite(given, f"section {name}", unit)})
 
 
 Part = TypeVar("Part")
@@ -77,20 +106,40 @@ def parts(given: object, kind: type[Part], whose: str) -> tuple[Part, ...]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Specimen:
-    """A clamped rod of square cross-section, magnetised along its axis.
+    """A clamped rod: of one shape, straight or curved, magnetised along any direction.
 
     Parameters
     ----------
     name : str
         What people call it.
-    side_mm : float
-        Side of the square cross-section, in mm.
-    remanence_mT : float
-        Axial remanence (residual flux density B_r) in mT; + points root to tip.
     sections : tuple of Section
-        Root first.
+        Root first. A property that varies along the rod is given as many short
+        sections (`profile_sections`).
+    shape : {"square", "rectangle", "round", "tube"}
+        Of the cross-section. It fixes which sizes are given.
+    side_mm : float
+        Side of a square, in mm. Of another shape it is filled in: the extent within
+        the xy plane, which the camera sees.
+    width_mm, height_mm : float, optional
+        Extent of a rectangle within the xy plane, and along z.
+    diameter_mm, bore_mm : float, optional
+        Diameter of a round rod, outer and inner diameter of a tube.
+    remanence_mT : float
+        Remanence (residual flux density B_r) along the axis in mT; + points root to
+        tip.
+    remanence_y_mT, remanence_z_mT : float
+        Remanence across the axis, along the rod's own y and z.
+    natural_curvature_per_mm : float
+        Curvature of the stress-free rod in its xy plane, in 1/mm; + bends toward +y.
     density_kg_m3 : float, optional
         Needed only where weight is taken into account.
+    poisson_ratio : float
+        For the torsion of rods that leave the plane.
+    side_sd_mm, length_sd_mm, remanence_sd_mT, density_sd_kg_m3, \
+    natural_curvature_sd_per_mm : float, optional
+        Standard deviations of what was measured.
+    recipe : mapping, optional
+        What the material was mixed from: names and amounts; kept as pairs.
 
     Raises
     ------
@@ -99,21 +148,66 @@ class Specimen:
     """
 
     name: str
-    side_mm: float
+    side_mm: float = 0.0
     remanence_mT: float
     sections: tuple[Section, ...]
     density_kg_m3: float | None = None
+    shape: str = "square"
+    width_mm: float | None = None
+    height_mm: float | None = None
+    diameter_mm: float | None = None
+    bore_mm: float | None = None
+    remanence_y_mT: float = 0.0
+    remanence_z_mT: float = 0.0
+    natural_curvature_per_mm: float = 0.0
+    poisson_ratio: float = 0.49
+    side_sd_mm: float | None = None
+    length_sd_mm: float | None = None
+    remanence_sd_mT: float | None = None
+    density_sd_kg_m3: float | None = None
+    natural_curvature_sd_per_mm: float | None = None
+    recipe: tuple[tuple[str, float | str], ...] = ()
 
     def __post_init__(self) -> None:
         store(
             self,
-            side_mm=size(self.side_mm, "side_mm", "mm"),
-            remanence_mT=finite(self.remanence_mT, "remanence_mT", "mT"),
             sections=parts(self.sections, Section, f"specimen {self.name!r}"),
+            poisson_ratio=within(self.poisson_ratio, -0.99, 0.5, "poisson_ratio", ""),
+            recipe=_pairs(self.recipe),
         )
+        for name, unit in SIGNED.items():
+            store(self, **{name: finite(getattr(self, name), name, unit)})
+        self._store_sizes()
         if self.density_kg_m3 is not None:
             density = positive(self.density_kg_m3, "density_kg_m3", "kg/m3")
             store(self, density_kg_m3=density)
+        for name, unit in DEVIATIONS.items():
+            if (given := getattr(self, name)) is not None:
+                store(self, **{name: within(given, 0.0, 1e9, name, unit)})
+
+    def _store_sizes(self) -> None:
+        """Store the sizes of the shape, and what the camera sees as the side."""
+        if self.shape == "square":
+            store(self, side_mm=size(self.side_mm, "side_mm", "mm"))
+        sizes = {name: getattr(self, name) for name in ALL_SIZES}
+        seen = sizes["diameter_mm"] or sizes["width_mm"]
+        if self.shape != "square" and sizes["side_mm"] == seen:
+            sizes["side_mm"] = None
+        found = cross_section(self.shape, f"specimen {self.name!r}", **sizes)
+        store(self, side_mm=found.width_mm)
+        for name in SIZES[self.shape]:
+            store(self, **{name: float(getattr(self, name))})
+        self._cross_sections()
+
+    def _cross_sections(self) -> tuple[CrossSection, ...]:
+        own = {name: getattr(self, name) for name in SIZES[self.shape]}
+        whose = f"a section of specimen {self.name!r}"
+        found = []
+        for section in self.sections:
+            given = {name: getattr(section, name) for name in ALL_SIZES}
+            sizes = {name: given[name] or own.get(name) for name in ALL_SIZES}
+            found.append(cross_section(self.shape, whose, **sizes))
+        return tuple(found)
 
     @property
     def length_mm(self) -> float:
@@ -131,17 +225,44 @@ class Specimen:
         return tuple(joints)
 
     @property
+    def cross_sections(self) -> tuple[CrossSection, ...]:
+        """Cross-section of each section."""
+        return self._cross_sections()
+
+    @property
     def sides_mm(self) -> tuple[float, ...]:
-        """Side of each section, in mm."""
-        return tuple(
-            self.side_mm if section.side_mm is None else section.side_mm
-            for section in self.sections
-        )
+        """Extent of each section within the xy plane, in mm: a square's side."""
+        return tuple(section.width_mm for section in self._cross_sections())
 
     @property
     def remanences_mT(self) -> tuple[float, ...]:
-        """Signed remanence of each section, in mT."""
-        return tuple(
-            self.remanence_mT if section.remanence_mT is None else section.remanence_mT
-            for section in self.sections
-        )
+        """Signed remanence of each section along the axis, in mT."""
+        return self._of_sections("remanence_mT")
+
+    @property
+    def transverse_mT(self) -> tuple[tuple[float, float], ...]:
+        """Remanence of each section along its own y and z, in mT."""
+        along_y = self._of_sections("remanence_y_mT")
+        return tuple(zip(along_y, self._of_sections("remanence_z_mT"), strict=True))
+
+    @property
+    def natural_curvatures_per_mm(self) -> tuple[float, ...]:
+        """Curvature of each section without stress, in 1/mm."""
+        return self._of_sections("natural_curvature_per_mm")
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is straight and magnetised along its axis."""
+        curved = any(self.natural_curvatures_per_mm)
+        return not curved and not any(any(pair) for pair in self.transverse_mT)
+
+    def _of_sections(self, name: str) -> tuple[float, ...]:
+        own: float = getattr(self, name)
+        given = (getattr(section, name) for section in self.sections)
+        return tuple(own if value is None else value for value in given)
+
+
+def _pairs(given: object) -> tuple[tuple[str, float | str], ...]:
+    """Return a recipe as pairs that can be hashed."""
+    items = listed(given.items() if isinstance(given, Mapping) else given) or ()
+    return tuple((str(name), amount) for name, amount in items)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
+from typing import Literal
 
-from pydantic import Field, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
+from .cross_section import ALL_SIZES, SIZES
 from .magnet import Magnet, Vector
 from .specimen import Section, Specimen
 from .toml import FileModel, read_toml
@@ -18,26 +21,54 @@ class SectionModel(FileModel):
     E_MPa: PositiveFloat
     side_mm: PositiveFloat | None = None
     remanence_mT: float | None = None
+    width_mm: PositiveFloat | None = None
+    height_mm: PositiveFloat | None = None
+    diameter_mm: PositiveFloat | None = None
+    bore_mm: PositiveFloat | None = None
+    remanence_y_mT: float | None = None
+    remanence_z_mT: float | None = None
+    natural_curvature_per_mm: float | None = None
 
 
 class SpecimenModel(FileModel):
     """A specimen file, or the specimen inside a plan."""
 
     name: str
-    side_mm: PositiveFloat
+    shape: Literal["square", "rectangle", "round", "tube"] = "square"
+    side_mm: PositiveFloat | None = None
+    width_mm: PositiveFloat | None = None
+    height_mm: PositiveFloat | None = None
+    diameter_mm: PositiveFloat | None = None
+    bore_mm: PositiveFloat | None = None
     remanence_mT: float
+    remanence_y_mT: float = 0.0
+    remanence_z_mT: float = 0.0
+    natural_curvature_per_mm: float = 0.0
     density_kg_m3: PositiveFloat | None = None
+    poisson_ratio: float = 0.49
+    side_sd_mm: NonNegativeFloat | None = None
+    length_sd_mm: NonNegativeFloat | None = None
+    remanence_sd_mT: NonNegativeFloat | None = None
+    density_sd_kg_m3: NonNegativeFloat | None = None
+    natural_curvature_sd_per_mm: NonNegativeFloat | None = None
+    recipe: dict[str, float | str] = Field(default_factory=dict)
     section: list[SectionModel] = Field(min_length=1)
+
+    def model_post_init(self, _context: object) -> None:
+        """Check that the sizes are those of the shape."""
+        for name in SIZES[self.shape]:
+            if getattr(self, name) is None:
+                raise ValueError(f"{name!r} is missing: the shape is {self.shape}")
 
     def specimen(self) -> Specimen:
         """Return the specimen it describes."""
-        return Specimen(
-            name=self.name,
-            side_mm=self.side_mm,
-            remanence_mT=self.remanence_mT,
-            density_kg_m3=self.density_kg_m3,
-            sections=tuple(Section(**dict(section)) for section in self.section),
-        )
+        given = {
+            name: value
+            for name in type(self).model_fields
+            if (value := getattr(self, name)) is not None and name != "section"
+        }
+        sections = tuple(Section(**dict(section)) for section in self.section)
+        return Specimen(**given, sections=sections)
 
 
 class MagnetModel(FileModel):
@@ -91,17 +122,20 @@ def read_magnet(path: Path) -> Magnet:
 
 def specimen_dict(specimen: Specimen) -> dict[str, object]:
     """Return the specimen with the keys of its file, optional keys only where set."""
-    data: dict[str, object] = {
-        "name": specimen.name,
-        "side_mm": specimen.side_mm,
-        "remanence_mT": specimen.remanence_mT,
-    }
-    if specimen.density_kg_m3 is not None:
-        data["density_kg_m3"] = specimen.density_kg_m3
+    data: dict[str, object] = {"name": specimen.name}
+    usual = {field.name: field.default for field in fields(Specimen)}
+    for key in SpecimenModel.model_fields:
+        value = getattr(specimen, key, None)
+        if key in (*SIZES[specimen.shape], "remanence_mT") or (
+            key not in ("name", "section", "recipe", *ALL_SIZES) and value != usual[key]
+        ):
+            data[key] = value
+    if specimen.recipe:
+        data["recipe"] = dict(specimen.recipe)
     data["section"] = [
         {
             key: value
-            for key in ("length_mm", "E_MPa", "side_mm", "remanence_mT")
+            for key in SectionModel.model_fields
             if (value := getattr(section, key)) is not None
         }
         for section in specimen.sections

@@ -119,6 +119,22 @@ def check_case(specimen: object, field: object, support: object) -> None:
         )
 
 
+def check_plain(specimen: Specimen) -> None:
+    """Refuse a rod that no planar solver takes: curved, or magnetised across.
+
+    Raises
+    ------
+    InputError
+        If it is either.
+    """
+    if not specimen.is_plain:
+        raise InputError(
+            f"specimen {specimen.name!r} must have natural_curvature_per_mm in 1/mm "
+            "and remanence_y_mT and remanence_z_mT in mT of 0 here; instead received "
+            "another: solve and solve_spatial take it"
+        )
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Support:
     """How the rod is held, and what else acts on it.

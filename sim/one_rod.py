@@ -92,7 +92,8 @@ def solve(
         return solve_solid(
             specimen, field, support=support, poisson_ratio=poisson_ratio, points=points
         )
-    if not (support.in_plane and (isinstance(field, UniformField) or field.in_plane)):
+    in_plane = support.in_plane and (isinstance(field, UniformField) or field.in_plane)
+    if not (in_plane and specimen.is_plain):
         from .spatial.solver import solve_spatial
 
         spatial = solve_spatial(specimen, field, support=support, points=points)

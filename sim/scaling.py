@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Mapping
 from functools import lru_cache, wraps
 from typing import ParamSpec
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.checks import whole
+from ..core.cross_section import SIZES
 from ..core.errors import InputError
 from ..core.jit import njit
 from ..core.magnet import Magnet
@@ -17,7 +19,7 @@ from ..core.specimen import Specimen
 from ..core.units import MU0, T_from_mT
 from .fields import FLUX_LIMIT_T, Field, MagnetField, Support, UniformField
 from .magnet.field import magnet_block
-from .magnet.flux import CUBOID, UNIFORM, WIDTH
+from .magnet.flux import CUBOID, PART, UNIFORM, WIDTH
 from .planar.march import WX, WY, E, H, M
 
 Array = NDArray[np.float64]
@@ -48,10 +50,12 @@ def array_cache(maxsize: int) -> Callable[[Callable[P, Array]], Callable[P, Arra
 
 @lru_cache(maxsize=256)
 def stiffness_Nmm2(specimen: Specimen) -> tuple[float, ...]:
-    """Return the bending stiffness E a^4 / 12 of each section, root first, in N mm2."""
+    """Return the in-plane bending stiffness of each section, root first, in N mm2."""
     return tuple(
-        section.E_MPa * side**4 / 12.0
-        for section, side in zip(specimen.sections, specimen.sides_mm, strict=True)
+        section.E_MPa * across.in_plane_mm4
+        for section, across in zip(
+            specimen.sections, specimen.cross_sections, strict=True
+        )
     )
 
 
@@ -71,17 +75,19 @@ def rod_array(specimen: Specimen, support: Support) -> Array:
     gx, gy, _ = support.gravity_m_s2
     density = checked_density(specimen, support)
     rows = []
-    for section, side, remanence_mT, stiffness in zip(
-        specimen.sections, specimen.sides_mm, specimen.remanences_mT, EI, strict=True
-    ):
+    for section, across, remanence_mT, stiffness in zip(
+        specimen.sections, specimen.cross_sections, specimen.remanences_mT, EI,
+        strict=True,
+    ):  # fmt: skip
+        area_mm2 = across.area_mm2
         if abs(remanence_mT) > FLUX_LIMIT_T * 1e3:
             raise InputError(
                 f"remanence_mT must be within {FLUX_LIMIT_T * 1e3:g} mT; instead "
                 f"received {remanence_mT!r}"
             )
         # A in mm2 times B_r in mT over mu0 is m in 1e-9 A m; m B is a force in N.
-        moment_Am = side**2 * remanence_mT * 1e-9 / MU0
-        weight_N = density * side**2 * length_mm * 1e-9
+        moment_Am = area_mm2 * remanence_mT * 1e-9 / MU0
+        weight_N = density * area_mm2 * length_mm * 1e-9
         rows.append(
             (
                 section.length_mm / length_mm,
@@ -104,7 +110,7 @@ def loads_per_unit(specimen: Specimen) -> tuple[Array, Array]:
     """Return m per mT of remanence and weight per (kg/m3 m/s2), tip first."""
     length_mm = specimen.length_mm
     per_N = length_mm**2 / stiffness_Nmm2(specimen)[0]
-    area = np.array(specimen.sides_mm)[::-1] ** 2
+    area = np.array([across.area_mm2 for across in specimen.cross_sections[::-1]])
     return area * 1e-9 / MU0 * per_N, area * length_mm * 1e-9 * per_N
 
 
@@ -182,14 +188,16 @@ def many_magnet_fields(magnet: Magnet, gap_mm: Array, length_mm: Array) -> Array
 
 
 def many_rods(
-    length_mm: Array, E_MPa: Array, side_mm: Array, remanence_mT: Array
+    length_mm: Array, E_MPa: Array, sizes_mm: Mapping[str, Array], remanence_mT: Array
 ) -> tuple[Array, Array, Array]:
     """Return many weightless rods as the kernels take them.
 
     Parameters
     ----------
-    length_mm, E_MPa, side_mm, remanence_mT : ndarray, shape (n, sections)
+    length_mm, E_MPa, remanence_mT : ndarray, shape (n, sections)
         Root first.
+    sizes_mm : mapping of ndarray, shape (n, sections)
+        Those by which one shape is given (`core.cross_section.SIZES`).
 
     Returns
     -------
@@ -205,8 +213,11 @@ def many_rods(
     """
     rods = np.empty((*length_mm.shape, 5))
     total_mm, margins = np.empty(len(length_mm)), np.empty(len(length_mm))
-    given = length_mm, E_MPa, side_mm, remanence_mT
-    if not _pack(*given, 1e-9 / MU0, rods, total_mm, margins):
+    shape = next(name for name, given in SIZES.items() if set(given) == set(sizes_mm))
+    first, *second = (sizes_mm[name] for name in SIZES[shape])
+    given = length_mm, E_MPa, first, second[0] if second else first, remanence_mT
+    code = ("square", "rectangle", "round", "tube").index(shape)
+    if not _pack(*given, code, 1e-9 / MU0, rods, total_mm, margins):
         raise InputError(
             "designs: length_mm, side_mm in mm and E_MPa in MPa must be of comparable "
             "size; instead received a design whose loads overflow"
@@ -214,11 +225,27 @@ def many_rods(
     return rods, total_mm, margins
 
 
+@njit(**PART)
+def _section(code, width, other):  # type: ignore[no-untyped-def]
+    """Return area and second moment of a section (`core.cross_section`)."""
+    square = width * width
+    if code == 0:
+        return square, square * square / 12.0
+    if code == 1:
+        return width * other, other * width * square / 12.0
+    hole = other * other if code == 3 else 0.0
+    return (
+        math.pi / 4.0 * (square - hole),
+        math.pi / 64.0 * (square * square - hole * hole),
+    )
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
-def _pack(length, modulus, side, remanence, moment, rods, total, margin):  # type: ignore[no-untyped-def]
+def _pack(length, modulus, width, other, remanence, code, moment, rods, total, margin):  # type: ignore[no-untyped-def]
     """Fill `rods` from columns of shape (n, sections), root first.
 
-    `moment` is that of 1 mm2 and 1 mT, in A m. Return whether all is finite.
+    `width` and `other` are the sizes of a shape with the number `code`, `moment` that
+    of 1 mm2 and 1 mT, in A m. Return whether all is finite.
     """
     n, sections = length.shape
     nothing = 0.0
@@ -227,15 +254,15 @@ def _pack(length, modulus, side, remanence, moment, rods, total, margin):  # typ
         widest = 0.0
         for k in range(sections):
             total[i] += length[i, k]
-            widest = max(widest, side[i, k])
+            widest = max(widest, width[i, k])
         margin[i] = widest / (2.0 * total[i])
-        EI = modulus[i, 0] * side[i, 0] ** 4 / 12.0
+        EI = modulus[i, 0] * _section(code, width[i, 0], other[i, 0])[1]
         per_N = total[i] * total[i] / EI
         for k in range(sections):
             row = rods[i, sections - 1 - k]
-            area = side[i, k] * side[i, k]
+            area, second = _section(code, width[i, k], other[i, k])
             row[H] = length[i, k] / total[i]
-            row[E] = EI / (modulus[i, k] * area * area / 12.0)
+            row[E] = EI / (modulus[i, k] * second)
             row[M] = area * remanence[i, k] * moment * per_N
             row[WX] = row[WY] = 0.0
             nothing += 0.0 * (row[H] + row[E] + row[M])

@@ -13,6 +13,10 @@ from ..fields import FLUX_LIMIT_T
 
 COLUMNS = {
     "side_mm": (1e-9, 1e9, "mm"),
+    "width_mm": (1e-9, 1e9, "mm"),
+    "height_mm": (1e-9, 1e9, "mm"),
+    "diameter_mm": (1e-9, 1e9, "mm"),
+    "bore_mm": (1e-9, 1e9, "mm"),
     "length_mm": (1e-9, 1e9, "mm"),
     "E_MPa": (1e-9, 1e9, "MPa"),
     "gap_mm": (1e-9, 1e9, "mm"),

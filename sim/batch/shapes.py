@@ -33,6 +33,9 @@ STATUS = ("stable", "unstable", "pulled in: no equilibrium", "not solved")
 
 ORDER = 10
 STEP = 0.6
+_OWN = (
+    "side_mm", "length_mm", "E_MPa", "gap_mm", "remanence_mT", "flux_mT", "angle_deg"
+)  # fmt: skip
 ROWS_PER_CALL = 512
 """Designs that one thread solves at a time; their shapes fit its cache."""
 
@@ -80,7 +83,7 @@ class Designs:
             check_magnet(self.magnet)
         columns = {
             name: column(name, values)
-            for name in COLUMNS
+            for name in _OWN
             if (values := getattr(self, name)) is not None
             or name not in ("flux_mT", "gap_mm")
         }
@@ -116,6 +119,11 @@ def designs_of(
     if not isinstance(specimen, Specimen):
         raise InputError(
             f"specimen must be a Specimen; instead received {shown(specimen)}"
+        )
+    if specimen.shape != "square" or not specimen.is_plain:
+        raise InputError(
+            f"specimen {specimen.name!r} must be straight, square and magnetised along "
+            "its axis to be a design; solve it with `magbend sim shape`"
         )
     if len(set(specimen.sides_mm)) > 1 or len(set(specimen.remanences_mT)) > 1:
         raise InputError(
@@ -183,7 +191,7 @@ def solve_shapes(
     rods, total_mm, margins = many_rods(
         designs.length_mm,
         designs.E_MPa,
-        np.repeat(designs.side_mm[:, None], k, axis=1),
+        {"side_mm": np.repeat(designs.side_mm[:, None], k, axis=1)},
         np.repeat(designs.remanence_mT[:, None], k, axis=1),
     )
     out = np.empty((n, points, 5))

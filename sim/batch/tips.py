@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.checks import shown, whole
+from ...core.cross_section import ALL_SIZES, SIZES
 from ...core.errors import InputError
 from ...core.magnet import Magnet
 from ...core.progress import Progress, silent
@@ -43,6 +44,7 @@ CHUNK = 4096
 _ORDER = 12
 _STEP = 0.4
 _WIDE = ("length_mm", "E_MPa")
+_PER_SECTION = (*ALL_SIZES, "remanence_mT")
 _MOST_THREADS = 1024
 
 
@@ -60,9 +62,10 @@ def solve_many(
     ----------
     designs : mapping of arrays, or structured array
         ``length_mm`` and ``E_MPa``, shape (n, sections) or (sections,), root first;
-        ``side_mm`` and ``remanence_mT``, shape (n, sections), (n,) or scalar; and
-        either ``flux_mT`` and ``angle_deg`` (90 by default), or ``gap_mm``, shape (n,)
-        or scalar.
+        ``remanence_mT`` and the sizes of one shape (``side_mm``; ``width_mm`` in the
+        plane and ``height_mm``; ``diameter_mm``, also with ``bore_mm``), shape
+        (n, sections), (n,) or scalar; and either ``flux_mT`` and ``angle_deg`` (90 by
+        default), or ``gap_mm``, shape (n,) or scalar.
     magnet : Magnet, optional
         The magnet to which ``gap_mm`` refers; in the plane of the rods.
     progress : callable
@@ -94,7 +97,7 @@ def solve_many(
     [3.621, 4.71]
     """
     columns = _columns(designs, magnet)
-    n = len(columns["side_mm"])
+    n = len(columns["remanence_mT"])
     out = np.empty(n, dtype=RESULT)
     for name in RESULT.names or ():
         out[name] = np.nan if name not in ("outcome", "morse_index") else -1
@@ -124,9 +127,9 @@ def _columns(
         )
     sections = arrays["length_mm"].shape[-1]
     for name, array in arrays.items():
-        full = (n, sections) if name in (*_WIDE, "side_mm", "remanence_mT") else (n,)
+        full = (n, sections) if name in (*_WIDE, *_PER_SECTION) else (n,)
         fits = array
-        if array.ndim == 1 and name in ("side_mm", "remanence_mT"):
+        if array.ndim == 1 and name in _PER_SECTION:
             fits = array[:, None]
         try:
             arrays[name] = np.ascontiguousarray(np.broadcast_to(fits, full))
@@ -135,6 +138,11 @@ def _columns(
                 f"designs: {name} in {COLUMNS[name][2]} must fit {n} designs of "
                 f"{sections} sections; instead received shape {array.shape}"
             ) from None
+    if "bore_mm" in arrays and np.any(arrays["bore_mm"] >= arrays["diameter_mm"]):
+        raise InputError(
+            "designs: every bore_mm in mm must be below its diameter_mm; instead "
+            "received one that is not"
+        )
     return arrays
 
 
@@ -150,7 +158,14 @@ def _given(
             f"received {shown(designs)}"
         )
     names = [str(name) for name in given]
-    wanted = {"length_mm", "E_MPa", "side_mm", "remanence_mT"}
+    sizes = {name for name in names if name in ALL_SIZES} or {"side_mm"}
+    if sizes not in [set(given) for given in SIZES.values()]:
+        raise InputError(
+            "designs must have the sizes of one shape, in mm: side_mm, or width_mm and "
+            "height_mm, or diameter_mm with or without bore_mm; instead received "
+            f"{', '.join(sorted(sizes))}"
+        )
+    wanted = {"length_mm", "E_MPa", "remanence_mT"} | sizes
     wanted |= {"gap_mm"} if before_magnet else {"flux_mT"}
     known = wanted if before_magnet else wanted | {"angle_deg"}
     if not wanted <= set(names) <= known:
@@ -170,7 +185,8 @@ def _solve_chunk(
 ) -> None:
     """Solve one chunk into `out`."""
     rods, total_mm, margins = many_rods(
-        columns["length_mm"], columns["E_MPa"], columns["side_mm"],
+        columns["length_mm"], columns["E_MPa"],
+        {name: columns[name] for name in ALL_SIZES if name in columns},
         columns["remanence_mT"],
     )  # fmt: skip
     n = len(rods)

@@ -96,15 +96,17 @@ def discretise(
     middle = np.repeat(0.5 * (mesh[1:] + mesh[:-1]), q)
     joints = np.array(specimen.joints_mm) * 1e-3
     which = np.searchsorted(joints, middle)
-    side = np.array(specimen.sides_mm)[which] * 1e-3
+    across = specimen.cross_sections
+    area = np.array([one.area_mm2 for one in across])[which] * 1e-6
+    second = np.array([one.in_plane_mm4 for one in across])[which] * 1e-12
     moduli = np.array([part.E_MPa for part in specimen.sections])[which] * 1e6
     remanence = np.array(specimen.remanences_mT)[which] * 1e-3
     s = (mesh[:-1, None] + np.diff(mesh)[:, None] * 0.5 * (xi + 1.0)).ravel()
     return Discretisation(
         s=s, weight=weight, angle=angle, slope=slope, place=place,
-        EI=moduli * side**4 / 12.0,
-        m=support.load_factor * side**2 * remanence / MU0,
-        load=_weight(specimen, support) * (side**2)[:, None],
+        EI=moduli * second,
+        m=support.load_factor * area * remanence / MU0,
+        load=_weight(specimen, support) * area[:, None],
     )  # fmt: skip
 
 

@@ -26,7 +26,7 @@ from ...core.checks import listed, shown, whole
 from ...core.errors import InputError, SolverError
 from ...core.specimen import Specimen
 from ...core.units import rad_from_deg
-from ..fields import Field, Solution, Support, UniformField, check_case
+from ..fields import Field, Solution, Support, UniformField, check_case, check_plain
 from .energy import Discretisation, discretise, energy, hessian, lagrange, node_places
 
 Array = NDArray[np.float64]
@@ -179,6 +179,7 @@ def check_solve(
     """
     support = support or Support()
     check_case(specimen, field, support)
+    check_plain(specimen)
     degree = whole(degree, 1, MOST_DEGREE, "degree")
     elements = whole(elements, 1, 1000, "elements")
     if not support.in_plane or not (isinstance(field, UniformField) or field.in_plane):

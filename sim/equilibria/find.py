@@ -23,7 +23,7 @@ from ...core.checks import whole
 from ...core.errors import InputError, SolverError
 from ...core.specimen import Specimen
 from ...core.units import T_from_mT
-from ..fields import STABLE, UNSTABLE, Support, UniformField, check_case
+from ..fields import STABLE, UNSTABLE, Support, UniformField, check_case, check_plain
 from ..planar.march import E, H, M
 from ..scaling import rod_array, stiffness_Nmm2
 from .march import ORDER, march, scan
@@ -101,6 +101,7 @@ def planar_rod(specimen: Specimen, field: UniformField, support: Support) -> Pla
         is beyond what can be told apart from an infinite one.
     """
     check_case(specimen, field, support)
+    check_plain(specimen)
     if not isinstance(field, UniformField):
         raise InputError(
             "field must be a UniformField for the scan of all equilibria; instead "

@@ -18,7 +18,7 @@ from ...core.checks import listed, shown
 from ...core.errors import InputError, SolverError
 from ...core.specimen import Specimen
 from ...core.units import rad_from_deg
-from ..fields import Field, Solution, Support, UniformField, check_case
+from ..fields import Field, Solution, Support, UniformField, check_case, check_plain
 from ..one_rod import NO_SUPPORT, solve
 from ..planar.solver import ORDER, STEP, solve_planar
 from ..scaling import field_array, rod_array, stations
@@ -97,6 +97,7 @@ def sensitivities(
             "gravity_m_s2[2] in m/s2, magnet elevation_deg and offset_mm[2] must be 0 "
             "for sensitivities, which are planar; instead received one that is not"
         )
+    check_plain(specimen)
     solution = solve(specimen, field, support=support)
     if solution.centreline is None:
         raise SolverError(

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import finite
+from ...core.cross_section import ALL_SIZES, SIZES
 from ...core.errors import InputError
 from ...core.specimen import Specimen
 from ...core.units import rad_from_deg
@@ -50,7 +51,8 @@ def change_of(name: str, specimen: Specimen, field: Field, support: Support) -> 
     match = re.fullmatch(r"([\w.]+?)(?:\[(\d+)\])?", name)
     key = match.group(1) if match else name
     index = int(match.group(2)) if match and match.group(2) is not None else None
-    if key in _OF_SECTIONS and (index is not None or key in _OF_ALL):
+    sizes = {"side_mm", *SIZES[specimen.shape]}
+    if (key in _OF_SECTIONS or key in sizes) and (index is not None or key in _OF_ALL):
         chosen = range(len(specimen.sections)) if index is None else [index]
         if index is not None and index >= len(specimen.sections):
             raise InputError(
@@ -58,7 +60,10 @@ def change_of(name: str, specimen: Specimen, field: Field, support: Support) -> 
                 f"counted from 0 at the root; instead received {index}"
             )
         for i in chosen:
-            _OF_SECTIONS[key](change, i, specimen, field, support)
+            if key in sizes:
+                _of_size(change, i, specimen, support, key)
+            else:
+                _OF_SECTIONS[key](change, i, specimen, field, support)
     elif key == "clamp_angle_deg" and index is None:
         change.clamp = rad_from_deg(1.0)
     elif key in ("load_factor", "density_kg_m3", "gravity_m_s2"):
@@ -75,12 +80,14 @@ def _of_E(
     change.rod[-1 - i, E] -= rod[-1 - i, E] / specimen.sections[i].E_MPa
 
 
-def _of_side(
-    change: Change, i: int, specimen: Specimen, field: Field, support: Support
+def _of_size(
+    change: Change, i: int, specimen: Specimen, support: Support, name: str
 ) -> None:
     row = rod_array(specimen, support)[-1 - i]
-    powers = np.array([0.0, -4.0, 2.0, 2.0, 2.0])
-    change.rod[-1 - i] += powers * row / specimen.sides_mm[i]
+    across = specimen.cross_sections[i]
+    area, second = across.change(name)
+    a, b = area / across.area_mm2, second / across.in_plane_mm4
+    change.rod[-1 - i] += np.array([0.0, -b, a, a, a]) * row
 
 
 def _of_remanence(
@@ -98,10 +105,9 @@ def _of_length(
         change.field[3] += 1.0 / specimen.length_mm
 
 
-_OF_ALL = ("side_mm", "remanence_mT")
+_OF_ALL = (*ALL_SIZES, "remanence_mT")
 _OF_SECTIONS: dict[str, Callable[[Change, int, Specimen, Field, Support], None]] = {
     "E_MPa": _of_E,
-    "side_mm": _of_side,
     "remanence_mT": _of_remanence,
     "length_mm": _of_length,
 }

@@ -42,6 +42,7 @@ from ..fields import (  # fmt: skip
     Support,
     UniformField,
     check_case,
+    check_plain,
 )
 from ..magnet.flux import flux_at
 from ..planar.solver import COARSE_ORDER as START_ORDER
@@ -183,6 +184,12 @@ def solve_solid(
     """
     support = support or Support()
     check_case(specimen, field, support)
+    check_plain(specimen)
+    if specimen.shape != "square":
+        raise InputError(
+            "the solid model takes square rods; instead received shape "
+            f"{specimen.shape!r}: use model 'rod'"
+        )
     _refuse_spatial(field, support)
     ratio = within(poisson_ratio, 0.0, 0.5, "poisson_ratio", "")
     held = _held(specimen, support, ratio)

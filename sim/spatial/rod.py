@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import positive, size, store, vector, within
+from ...core.cross_section import torsion_constant_mm4
 from ...core.errors import InputError
 from ...core.specimen import Specimen, parts
 from ...core.units import MU0
@@ -34,6 +35,8 @@ class SpatialSection:
         Extent along d1 and d2; for a round section both the diameter.
     round_section : bool
         Circular (or elliptic) instead of rectangular.
+    bore_mm : float
+        Inner diameter of a circular tube.
     remanence_mT : tuple of float
         Remanence along (d1, d2, d3), in mT: tilted where the first two are not zero.
     rest_curvature_per_mm : tuple of float
@@ -48,6 +51,7 @@ class SpatialSection:
     width_mm: float
     height_mm: float
     round_section: bool = False
+    bore_mm: float = 0.0
     remanence_mT: Vector = ZERO
     rest_curvature_per_mm: Vector = ZERO
     poisson_ratio: float = 0.49
@@ -68,13 +72,20 @@ class SpatialSection:
             remanence_mT=remanence,
             rest_curvature_per_mm=rest,
             poisson_ratio=ratio,
+            bore_mm=within(self.bore_mm, 0.0, 1e9, "section bore_mm", "mm"),
         )
+        thin = min(self.width_mm, self.height_mm)
+        if self.bore_mm >= thin or (self.bore_mm and not self.round_section):
+            raise InputError(
+                "section bore_mm must be that of a round section, and below its "
+                f"diameter of {thin:g} mm; instead received {self.bore_mm:g} mm"
+            )
 
     @property
     def area_mm2(self) -> float:
         """Area of the cross-section, in mm2."""
         area = self.width_mm * self.height_mm
-        return area * math.pi / 4.0 if self.round_section else area
+        return (area - self.bore_mm**2) * math.pi / 4.0 if self.round_section else area
 
     @property
     def stiffness_Nmm2(self) -> Vector:
@@ -84,6 +95,9 @@ class SpatialSection:
         if self.round_section:
             about_d1, about_d2 = math.pi * w * h**3 / 64.0, math.pi * h * w**3 / 64.0
             torsion = math.pi * w**3 * h**3 / (16.0 * (w**2 + h**2))
+            hole = math.pi * self.bore_mm**4 / 64.0
+            about_d1, about_d2 = about_d1 - hole, about_d2 - hole
+            torsion -= 2.0 * hole
         else:
             about_d1, about_d2 = w * h**3 / 12.0, h * w**3 / 12.0
             torsion = torsion_constant_mm4(w, h)
@@ -117,38 +131,26 @@ class SpatialRod:
         return sum(section.length_mm for section in self.sections)
 
     @classmethod
-    def from_specimen(
-        cls, specimen: Specimen, *, poisson_ratio: float = 0.49
-    ) -> SpatialRod:
-        """Return the specimen's straight rod of square, axially magnetised sections."""
+    def from_specimen(cls, specimen: Specimen) -> SpatialRod:
+        """Return the specimen as a rod in space."""
         return cls(
             sections=tuple(
                 SpatialSection(
                     length_mm=part.length_mm, E_MPa=part.E_MPa,
-                    width_mm=side, height_mm=side,
-                    remanence_mT=(0.0, 0.0, remanence),
-                    poisson_ratio=poisson_ratio,
+                    width_mm=across.width_mm, height_mm=across.height_mm,
+                    bore_mm=across.bore_mm, round_section=across.is_round,
+                    remanence_mT=(y, z, remanence),
+                    rest_curvature_per_mm=(0.0, curvature, 0.0),
+                    poisson_ratio=specimen.poisson_ratio,
                 )
-                for part, side, remanence in zip(
-                    specimen.sections, specimen.sides_mm, specimen.remanences_mT,
+                for part, across, (y, z), remanence, curvature in zip(
+                    specimen.sections, specimen.cross_sections, specimen.transverse_mT,
+                    specimen.remanences_mT, specimen.natural_curvatures_per_mm,
                     strict=True,
                 )
             ),
             density_kg_m3=specimen.density_kg_m3,
         )  # fmt: skip
-
-
-def torsion_constant_mm4(width_mm: float, height_mm: float) -> float:
-    """Return the torsion constant J of a rectangle, in mm4.
-
-    Notes
-    -----
-    Saint-Venant's series, J = b t^3 [1/3 - (64 / pi^5) (t / b) sum tanh(k pi b / 2 t) /
-    k^5 over odd k], t the shorter side; 20 terms leave 1e-9. A square: 0.1405771 a^4.
-    """
-    t, b = sorted((width_mm, height_mm))
-    series = sum(math.tanh(k * math.pi * b / (2.0 * t)) / k**5 for k in range(1, 40, 2))
-    return b * t**3 * (1.0 / 3.0 - 64.0 / math.pi**5 * t / b * series)
 
 
 def rod_table(rod: SpatialRod, support: Support) -> Array:

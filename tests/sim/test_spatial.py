@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from magbend.core.cross_section import torsion_constant_mm4
 from magbend.core.errors import InputError
 from magbend.core.magnet import Magnet
 from magbend.core.units import GRAVITY_M_PER_S2, MU0
@@ -22,7 +23,7 @@ from magbend.sim.one_rod import solve
 from magbend.sim.scaling import field_array
 from magbend.sim.spatial.index import morse_index
 from magbend.sim.spatial.march import AXIAL, MU1, MU2, flux_at
-from magbend.sim.spatial.rod import rod_table, torsion_constant_mm4
+from magbend.sim.spatial.rod import rod_table
 from magbend.sim.spatial.solver import SpatialRod, SpatialSection, solve_spatial
 
 SIM = Path(__file__).parents[2] / "fixtures" / "sim"
