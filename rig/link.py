@@ -15,7 +15,11 @@ from typing import Any, TextIO
 from ..core.errors import StageError
 from .clock import Clock
 from .errors import LinkLostError
-from .ports import register_twin_urls, why_not_open
+from .ports import (
+    check_port,
+    register_twin_urls,
+    why_not_open,
+)
 
 _SLICE_S = 0.02
 _MAX_LINE = 4096
@@ -112,6 +116,7 @@ class Link:
 
         register_twin_urls()
         try:
+            check_port(self.port)
             options: dict[str, Any] = {"do_not_open": True, "timeout": _SLICE_S}
             port = serial.serial_for_url(
                 self.port, self._baud, write_timeout=2.0, exclusive=True, **options

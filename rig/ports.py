@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import stat
 from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
 
 from ..core.errors import StageError
 
@@ -77,6 +80,84 @@ def resolve_port(spec: str) -> str:
     raise StageError(
         f"stage.port = {spec!r} fits more than one port ({seen}); name one of them"
     )
+
+
+def why_not_allowed(port: str, *, network: bool) -> str:
+    """Return why a port may not be named, in a clause; empty if it may.
+
+    Of pyserial's addresses only the harmless are taken: others empty files, search the
+    machine or start servers. Allowed are device names, ``auto``, ``serial:NUMBER``,
+    the virtual ``twin://NAME`` and ``twinmeter://``, and, with `network`,
+    ``socket://HOST:PORT``.
+    """
+    if "\0" in port:
+        return "holds a character that no port has"
+    scheme, separator, rest = port.partition("://")
+    if not separator:
+        return ""
+    scheme = scheme.lower()
+    if scheme == "twin":
+        return _why_no_twin(rest.partition("?")[0])
+    if scheme == "twinmeter":
+        return ""
+    if scheme == "socket":
+        return (
+            "" if network else "is on the network; if it is meant, add network = true"
+        )
+    return (
+        "is an address of another kind; write a device name, auto, serial:NUMBER, "
+        "twin://FILE.json, or socket://HOST:PORT with network = true"
+    )
+
+
+def _why_no_twin(name: str) -> str:
+    path = PurePosixPath(name)
+    if path.is_absolute() or ".." in path.parts or "\\" in name or ":" in name:
+        return "must lie in the folder of the rig file: twin://FILE.json"
+    return ""
+
+
+def allowed_port(port: str, *, network: bool) -> str:
+    """Return `port` if it may be named in a file.
+
+    Raises
+    ------
+    ValueError
+        Why not, as the validator of a file says it.
+    """
+    why = why_not_allowed(port, network=network)
+    if why:
+        raise ValueError(why)
+    return port
+
+
+def check_port(port: str) -> None:
+    """Refuse to open what is no port, whoever named it.
+
+    Raises
+    ------
+    ValueError
+        If it is an address of another kind, a file, a folder or a pipe.
+    """
+    why = why_not_allowed(port, network=True)
+    if why and not port.lower().startswith("twin://"):
+        raise ValueError(f"it {why}")
+    if os.name != "posix" or "://" in port:
+        return
+    try:
+        mode = Path(port).stat().st_mode
+    except OSError:
+        return  # opening it says what is wrong
+    if not stat.S_ISCHR(mode):
+        raise ValueError("it is no device, and is left alone")
+
+
+def twin_under(port: str, folder: Path) -> str:
+    """Return ``twin://FILE.json`` with its file in `folder`; else the port itself."""
+    if not port.lower().startswith("twin://"):
+        return port
+    name, mark, query = port.partition("://")[2].partition("?")
+    return f"twin://{folder / name}{mark}{query}" if name.endswith(".json") else port
 
 
 def why_not_open(port: str, error: Exception) -> str:

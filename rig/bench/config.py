@@ -169,7 +169,11 @@ def read_rig(path: Path) -> RigModel:
     ConfigError
         One sentence with file, line and key.
     """
-    return read_toml(path, RigModel)
+    rig = read_toml(path, RigModel)
+    folder = path.resolve().parent
+    here = folder == Path.cwd()  # a short name in messages and records, where it can be
+    stage = rig.stage if here else rig.stage.lying_in(folder)
+    return rig.model_copy(update={"stage": stage})
 
 
 def read_plan(path: Path) -> Plan:

@@ -16,7 +16,7 @@ import serial
 
 from ...core.errors import MeterError
 from ..clock import Check, go_on
-from ..ports import register_twin_urls, why_not_open
+from ..ports import check_port, register_twin_urls, why_not_open
 from .description import MeterDescription
 from .parse import parse_multiplier, parse_reply, parse_unit
 from .protocol import Flux, Sample, combine
@@ -127,6 +127,7 @@ class SerialMeter:
         line = self._description.line
         register_twin_urls()
         try:
+            check_port(self._port)
             device = serial.serial_for_url(
                 self._port, do_not_open=True, baudrate=line.baud, bytesize=line.bits,
                 parity=line.parity, stopbits=line.stop_bits, timeout=_SLICE_S,

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import (
+    Field,
+    PrivateAttr,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from ...core.toml import FileModel
+from ..ports import allowed_port, twin_under
 
 PositiveNumber = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
@@ -18,6 +26,7 @@ class StageConfig(FileModel):
     The map is ``gap_mm = gap_at_zero_mm + direction * machine_mm``.
     """
 
+    network: bool = False
     driver: Literal["grbl", "marlin"] = "grbl"
     port: str = "auto"
     baud: int = Field(default=115200, gt=0)
@@ -40,6 +49,23 @@ class StageConfig(FileModel):
     max_feed_mm_min: PositiveNumber | None = None
     acceleration_mm_s2: PositiveNumber | None = None
     settings: dict[str, float] = Field(default_factory=dict)
+    _folder: Path = PrivateAttr(default=Path())
+
+    @property
+    def address(self) -> str:
+        """The port, with the file of a virtual board where the rig file lies."""
+        return twin_under(self.port, self._folder)
+
+    def lying_in(self, folder: Path) -> StageConfig:
+        """Return the same table of a rig file in `folder`."""
+        table = self.model_copy()
+        table._folder = folder
+        return table
+
+    @field_validator("port")
+    @classmethod
+    def _may_be_named(cls, port: str, info: ValidationInfo) -> str:
+        return allowed_port(port, network=info.data.get("network", False))
 
     @model_validator(mode="after")
     def _home_command_is_a_homing(self) -> StageConfig:

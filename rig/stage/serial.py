@@ -138,7 +138,7 @@ class SerialStage(ABC, Generic[Session]):
         config = self._config
         self._let_go()
         self._trust.lose()
-        port = resolve_port(config.port)
+        port = resolve_port(config.address)
         link = Link(
             port, baud=config.baud, clock=self._clock, log=self._log, dtr=config.dtr
         )

@@ -80,7 +80,7 @@ def stop_from_outside(rig_file: Path, config: StageConfig, clock: Clock) -> str:
     try:
         answer = ask(rig_file, "stop", port=config.port)
     except NobodyError:
-        return _hold_directly(config, resolve_port(config.port), clock)
+        return _hold_directly(config, resolve_port(config.address), clock)
     return str(answer["text"])
 
 

@@ -137,6 +137,8 @@ class Serial(SerialBase):
     def _own_board(self, name: str, query: dict[str, list[str]]) -> GrblBoard:
         speed = float(query.get("speed", ["1"])[0])
         self._clock = SystemClock() if speed == 1.0 else ScaledClock(speed)
+        if name and not name.endswith(".json"):
+            raise SerialException(f"there is no virtual board named {name}")
         self._state_file = Path(name) if name else None
         try:
             return load_board(self._state_file)
