@@ -2,6 +2,7 @@
 # make test    set up .venv with the test tools and run the test-suite
 # make check   lint, format and type checks, and the import contract
 # make docs    build the site into docs/site (the tests of this are in .ci/run)
+# make mutants  break a few places at random and see whether the tests notice (COUNT=12 SEED=...)
 # make clean   remove .venv and build products
 
 PYTHON ?= python3
@@ -10,7 +11,7 @@ OUT    ?= demo
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test check docs clean
+.PHONY: demo test check docs mutants clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.ready
@@ -31,6 +32,9 @@ check: $(VENV)/.ready-test
 docs: $(VENV)/.ready-test
 	$(BIN)/python -m sphinx -W --keep-going -q -j 2 docs docs/site
 	@echo "docs/site/index.html"
+
+mutants: $(VENV)/.ready-test
+	$(BIN)/python tests/mutants.py --count $(or $(COUNT),12) $(if $(SEED),--seed $(SEED))
 
 $(VENV)/.created:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
