@@ -305,3 +305,23 @@ def test_what_happens_while_the_stage_stands_is_heard_unasked(name):
 
     with pytest.raises(error):
         listen_for_half_a_second()
+
+
+def test_after_an_unanswered_line_the_board_is_reset_before_it_moves():
+    # An answer that comes late would count for the next line, and each after it.
+    bench = homed_bench()
+    receive, sent = bench.board.receive, []
+
+    def lose_the_unlocking(data):
+        sent.append(bytes(data))
+        if not data.startswith(b"$X"):
+            receive(data)
+
+    bench.board.receive = lose_the_unlocking
+    with pytest.raises(StageTimeoutError):
+        bench.raw.unlock()
+    del sent[:]
+    bench.stage.goto_gap(60.0)
+    words = b"".join(sent)
+    assert words.index(b"\x18") < words.index(b"$J")
+    assert bench.true_gap_mm == pytest.approx(60.0, abs=0.005)
