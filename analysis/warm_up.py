@@ -55,7 +55,7 @@ def _photograph() -> None:
     from ..core.centreline import Centreline
     from ..vision import as_photo, extract
     from ..vision.measurement import Pose
-    from ..vision.synthetic.scene import Block, Scene, render_scene, scene_camera
+    from ..vision.synthetic import Block, Scene, render_scene, scene_camera
     from .compare import metrics
 
     s = np.linspace(0.0, 30.0, 121)

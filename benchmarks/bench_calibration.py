@@ -20,7 +20,7 @@ import numpy as np
 from magbend.vision import Board, Calibration, Photo, as_photo, calibrate
 from magbend.vision.camera.board import find_corners
 from magbend.vision.picture.srgb import encode_srgb
-from magbend.vision.synthetic.scene import render_board, scene_camera
+from magbend.vision.synthetic import render_board, scene_camera
 
 BOARD = Board(columns=11, rows=7, square_mm=6.0, marker_mm=4.5)
 SIZE = (1600, 1200)

@@ -26,8 +26,7 @@ from magbend.vision import (
     extract,
     specimen_to_px,
 )
-from magbend.vision.synthetic.frames import curve
-from magbend.vision.synthetic.scene import (
+from magbend.vision.synthetic import (
     BLACK,
     BLUE,
     GREY,
@@ -37,6 +36,7 @@ from magbend.vision.synthetic.scene import (
     render_scene,
     scene_camera,
 )
+from magbend.vision.synthetic.frames import curve
 from magbend.vision.synthetic.score import signed_distance
 
 COLOURS = {"grey": GREY, "blue": BLUE, "black": BLACK}

@@ -22,8 +22,8 @@ from magbend.core.magnet import Magnet
 from magbend.sim import gmc
 from magbend.vision import Calibration, Measurement, Pose, as_photo, extract
 from magbend.vision.batch.shared_clamp import Reading, shared_direction
+from magbend.vision.synthetic import Scene, render_scene
 from magbend.vision.synthetic.frames import curve
-from magbend.vision.synthetic.scene import Scene, render_scene
 from magbend.vision.synthetic.score import signed_distance
 
 Shot = tuple[Measurement, np.ndarray, float]

@@ -20,7 +20,7 @@ from ...core.specimen import Specimen
 from ...sim import MagnetField, Solution, Support, magnet_flux_mT, solve
 from ...vision.camera.board import Board
 from ...vision.measurement import Pose
-from ...vision.synthetic.scene import (
+from ...vision.synthetic import (
     Block,
     Scene,
     SceneLight,

@@ -14,7 +14,7 @@ from magbend.core.errors import InputError, VisionError
 from magbend.vision.camera.board import Board, find_corners
 from magbend.vision.camera.board_print import write_board
 from magbend.vision.picture.photo import as_photo
-from magbend.vision.synthetic.scene import render_board, scene_camera
+from magbend.vision.synthetic import render_board, scene_camera
 
 DESIGNS = [
     Board(),

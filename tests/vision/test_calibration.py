@@ -26,7 +26,7 @@ from magbend.vision.camera.calibration_file import (
 )
 from magbend.vision.measurement import Pose
 from magbend.vision.picture.photo import Photo, as_photo, read_photo
-from magbend.vision.synthetic.scene import render_board, scene_camera
+from magbend.vision.synthetic import render_board, scene_camera
 
 FIXTURES = Path(__file__).parents[2] / "fixtures" / "vision" / "rendered"
 BOARD = Board()

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from magbend.vision import Measurement, Pose, as_photo, extract
-from magbend.vision.synthetic.frames import curve
-from magbend.vision.synthetic.scene import (
+from magbend.vision.synthetic import (
     Block,
     Scene,
     SceneLight,
     render_scene,
     scene_camera,
 )
+from magbend.vision.synthetic.frames import curve
 
 HEIGHT_MM, TOP_MM = 0.9, 4.0
 

@@ -13,8 +13,7 @@ from hypothesis.extra.numpy import arrays
 
 from magbend.vision import Pose, as_photo, extract, read_photo, score
 from magbend.vision.camera.calibration import Calibration
-from magbend.vision.synthetic.frames import HARD, STANDARD, curve, draw
-from magbend.vision.synthetic.scene import (
+from magbend.vision.synthetic import (
     BLACK,
     BLUE,
     Block,
@@ -23,6 +22,7 @@ from magbend.vision.synthetic.scene import (
     render_scene,
     scene_camera,
 )
+from magbend.vision.synthetic.frames import HARD, STANDARD, curve, draw
 from magbend.vision.synthetic.score import signed_distance
 
 FIXTURES = Path(__file__).parents[2] / "fixtures" / "vision"

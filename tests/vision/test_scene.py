@@ -10,18 +10,18 @@ import pytest
 from magbend.vision.camera.calibration import specimen_to_px
 from magbend.vision.measurement import Pose
 from magbend.vision.picture.photo import as_photo
-from magbend.vision.synthetic import scene as scene_module
-from magbend.vision.synthetic.frames import curve
-from magbend.vision.synthetic.scene import (
+from magbend.vision.synthetic import (
     BLACK,
     BLUE,
     GREY,
     Block,
     Scene,
     SceneLight,
+    drawing,
     render_scene,
     scene_camera,
 )
+from magbend.vision.synthetic.frames import curve
 
 CLAMP = Block(pose=Pose(x_mm=15.0, y_mm=-24.0, angle_deg=3.0, height_mm=0.9))
 QUIET = SceneLight(noise=0.0, blur_px=0.3)
@@ -53,7 +53,7 @@ def test_seeds_rule_noise_and_paper():
 
 @pytest.mark.parametrize("tilt", [0.0, 8.0])
 def test_axis_lies_in_the_middle_of_the_dark_silhouette(monkeypatch, tilt):
-    monkeypatch.setattr(scene_module, "SHEEN", 0.0)
+    monkeypatch.setattr(drawing, "SHEEN", 0.0)
     camera = scene_camera(tilt_deg=tilt)
     line = curve("graded", angle_deg=-70.0)
     light = replace(QUIET, shadow_depth=0.0)

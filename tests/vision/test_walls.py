@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from magbend.core.centreline import Centreline
-from magbend.vision import as_photo, extract
+from magbend.vision import as_photo, extract, synthetic
 from magbend.vision.edge import edges, wall_light
 from magbend.vision.edge.wall_light import short_of_end
 from magbend.vision.measurement import Pose
-from magbend.vision.synthetic import scene
+from magbend.vision.synthetic import drawing
 
 S = np.linspace(0.0, 30.0, 301)
 ZERO = np.zeros_like(S)
@@ -82,11 +82,13 @@ def test_a_wall_mirrors_the_paper_it_faces():
 
 def measured(toward_deg, seed=0):
     """Return the error of the midline, px, and the width, mm, of a straight rod."""
-    camera = scene.scene_camera(tilt_deg=6.0, tilt_direction_deg=toward_deg)
-    clamp = scene.Block(pose=Pose(x_mm=16.0, y_mm=-25.0, angle_deg=0.0, height_mm=0.9))
-    light = scene.SceneLight(shadow_depth=0.0, noise=5e-4)
-    bench = scene.Scene(clamp=clamp, centreline=STRAIGHT, light=light, dust=0)
-    picture = scene.render_scene(bench, camera, np.random.default_rng(seed))
+    camera = synthetic.scene_camera(tilt_deg=6.0, tilt_direction_deg=toward_deg)
+    clamp = synthetic.Block(
+        pose=Pose(x_mm=16.0, y_mm=-25.0, angle_deg=0.0, height_mm=0.9)
+    )
+    light = synthetic.SceneLight(shadow_depth=0.0, noise=5e-4)
+    bench = synthetic.Scene(clamp=clamp, centreline=STRAIGHT, light=light, dust=0)
+    picture = synthetic.render_scene(bench, camera, np.random.default_rng(seed))
     found = extract(as_photo(picture), camera, rod_height_mm=0.9)
     true = camera.to_px(clamp.pose.to_board(STRAIGHT.points_mm), height_mm=0.9)
     x, y = found.points["x_px"], found.points["y_px"]
@@ -103,8 +105,8 @@ def test_the_middle_is_the_axis_from_either_side(toward_deg):
 
 @pytest.mark.parametrize("toward_deg", [90.0, -90.0])
 def test_scenes_draw_walls_as_dark_as_the_top_where_they_are(monkeypatch, toward_deg):
-    monkeypatch.setattr(scene, "SHEEN", 0.0)
-    monkeypatch.setattr(scene, "WALL_SKY", 1.0)
+    monkeypatch.setattr(drawing, "SHEEN", 0.0)
+    monkeypatch.setattr(drawing, "WALL_SKY", 1.0)
     monkeypatch.setattr(wall_light, "MIRRORED", 0.0)
     monkeypatch.setattr(wall_light, "SKY", 1.0)
     error, width = measured(toward_deg)

@@ -31,23 +31,50 @@ from .frames import (
 from .frames import (
     frames as frames,
 )
-from .scene import (
+from .parts import (
+    BLACK as BLACK,
+)
+from .parts import (
+    BLUE as BLUE,
+)
+from .parts import (
+    GREY as GREY,
+)
+from .parts import (
+    PAPER as PAPER,
+)
+from .parts import (
+    RUBBER as RUBBER,
+)
+from .parts import (
     Block as Block,
 )
-from .scene import (
+from .parts import (
+    Mark as Mark,
+)
+from .parts import (
+    Rod as Rod,
+)
+from .parts import (
     Scene as Scene,
 )
-from .scene import (
+from .parts import (
     SceneLight as SceneLight,
+)
+from .parts import (
+    scene_camera as scene_camera,
+)
+from .scene import (
+    expose as expose,
+)
+from .scene import (
+    paint_scene as paint_scene,
 )
 from .scene import (
     render_board as render_board,
 )
 from .scene import (
     render_scene as render_scene,
-)
-from .scene import (
-    scene_camera as scene_camera,
 )
 from .score import (
     Score as Score,
