@@ -83,9 +83,8 @@ def test_a_wall_mirrors_the_paper_it_faces():
 def measured(toward_deg, seed=0):
     """Return the error of the midline, px, and the width, mm, of a straight rod."""
     camera = synthetic.scene_camera(tilt_deg=6.0, tilt_direction_deg=toward_deg)
-    clamp = synthetic.Block(
-        pose=Pose(x_mm=16.0, y_mm=-25.0, angle_deg=0.0, height_mm=0.9)
-    )
+    pose = Pose(x_mm=16.0, y_mm=-25.0, angle_deg=0.0, height_mm=0.9)
+    clamp = synthetic.Block(pose=pose)
     light = synthetic.SceneLight(shadow_depth=0.0, noise=5e-4)
     bench = synthetic.Scene(clamp=clamp, centreline=STRAIGHT, light=light, dust=0)
     picture = synthetic.render_scene(bench, camera, np.random.default_rng(seed))
