@@ -204,3 +204,16 @@ def test_damaged_files_raise_nothing_but_our_error(data):
     except VisionError:
         return
     assert np.isfinite(photo.grey).all()
+
+
+def test_colour_is_there_when_it_is_asked_for(tmp_path):
+    pixels = np.zeros((20, 30, 3), np.uint8)
+    pixels[:, :10], pixels[:, 10:20], pixels[:, 20:] = (255, 0, 0), (0, 255, 0), 128
+    path = tmp_path / "colour.png"
+    assert cv2.imwrite(str(path), pixels)
+    for photo in (as_photo(pixels), read_photo(path)):
+        light = photo.colour()
+        np.testing.assert_array_equal(light[5, 5], (1.0, 0.0, 0.0))
+        np.testing.assert_array_equal(light[5, 15], (0.0, 1.0, 0.0))
+        assert light[5, 25] == pytest.approx(0.2159, abs=1e-4)
+    assert as_photo(pixels[..., 0]).colour() is None

@@ -38,4 +38,4 @@ def flattened(photo: Photo, bare: Photo) -> Photo:
     smooth = cv2.GaussianBlur(bare.grey, (0, 0), 4.0)
     typical = float(np.median(smooth))
     grey = photo.grey * (typical / np.maximum(smooth, 0.05 * typical))
-    return replace(photo, grey=np.asarray(grey, dtype=np.float32))
+    return replace(photo, grey=np.asarray(grey, dtype=np.float32), decode=None)

@@ -9,8 +9,9 @@ this module sees grey values proportional to light, paper about 0.7, black about
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
-from functools import cache
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -38,11 +39,28 @@ class Photo:
         Name for messages and tables.
     clipped : float
         Fraction of pixels at the top of the scale.
+    decode : callable, optional
+        Gives the pixels in colour, as `as_photo` takes them; see `colour`.
     """
 
     grey: NDArray[np.float32]
     source: str = "array"
     clipped: float = 0.0
+    decode: Callable[[], NDArray[Any]] | None = field(
+        default=None, repr=False, compare=False
+    )
+
+    def colour(self) -> NDArray[np.float32] | None:
+        """Return linear blue, green and red, (h, w, 3); None for a grey picture.
+
+        A file is decoded for it once more: most photographs are measured without.
+        """
+        if self.decode is None:
+            return None
+        pixels = self.decode()
+        if pixels.ndim != 3 or pixels.shape[2] < 3:
+            return None
+        return _linear(np.ascontiguousarray(pixels[..., :3]), linear=False)
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -106,7 +124,11 @@ def decode_photo(data: bytes, *, source: str = "data", linear: bool = False) -> 
     pixels = _decode(data, source, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH)
     if data[:8] == _PNG and data[25] in (4, 6):
         pixels = _with_alpha(data, source, pixels)
-    return as_photo(pixels, source=source, linear=linear)
+    photo = as_photo(pixels, source=source, linear=linear)
+    if linear or pixels.ndim != 2:  # transparent pixels are white there
+        return replace(photo, decode=None)
+    flags = cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH
+    return replace(photo, decode=partial(_decode, data, source, flags))
 
 
 def _decode(data: bytes, source: str, flags: int) -> NDArray[Any]:
@@ -156,7 +178,8 @@ def as_photo(
     VisionError
         If the shape, the type or the values are not those of a picture.
     """
-    grey = _to_grey(np.asarray(pixels), source)
+    pixels = np.asarray(pixels)
+    grey = _to_grey(pixels, source)
     height, width = grey.shape
     if min(height, width) < MIN_SIDE or height * width > MAX_PIXELS:
         raise VisionError(
@@ -164,17 +187,23 @@ def as_photo(
             f"at most {MAX_PIXELS / 1e6:.0f} megapixels; instead received "
             f"{width} x {height} px"
         )
-    if grey.dtype == np.uint8:
-        top, light = 255, np.asarray(cv2.LUT(grey, _table(8, linear)), np.float32)
-    elif grey.dtype == np.uint16:
-        top, light = 65535, _table(16, linear)[grey]
-    else:
-        light = np.ascontiguousarray(grey, dtype=np.float32)
-        if not bool(np.isfinite(light).all()):
-            raise VisionError(f"{source}: the picture holds NaN or infinity")
-        return Photo(grey=light, source=source, clipped=float(np.mean(light >= 1.0)))
-    clipped = float(cv2.countNonZero((grey == top).view(np.uint8))) / grey.size
-    return Photo(grey=light, source=source, clipped=clipped)
+    light = _linear(grey, linear=linear)
+    top = 1.0 if grey.dtype.kind == "f" else np.iinfo(grey.dtype).max
+    if top == 1.0 and not bool(np.isfinite(light).all()):
+        raise VisionError(f"{source}: the picture holds NaN or infinity")
+    full = grey >= top if top == 1.0 else grey == top
+    clipped = float(cv2.countNonZero(full.view(np.uint8))) / grey.size
+    decode = None if linear or pixels.ndim != 3 else partial(np.asarray, pixels)
+    return Photo(grey=light, source=source, clipped=clipped, decode=decode)
+
+
+def _linear(values: NDArray[Any], *, linear: bool) -> NDArray[np.float32]:
+    """Return the light of pixel values of any type that a photograph may have."""
+    if values.dtype == np.uint8:
+        return np.asarray(cv2.LUT(values, _table(8, linear)), np.float32)
+    if values.dtype == np.uint16:
+        return _table(16, linear)[values]
+    return np.ascontiguousarray(values, dtype=np.float32)
 
 
 _PNG = b"\x89PNG\r\n\x1a\n"
