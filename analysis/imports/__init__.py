@@ -1,0 +1,1 @@
+"""Other people's shapes, tables and photographs, read through one door."""

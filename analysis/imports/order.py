@@ -1,0 +1,103 @@
+"""Points in the order of the rod, from clamp to tip, and in the clamp's frame."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...core.errors import InputError
+from .shapes import Array, RawShape
+
+
+def path_length(points: Array) -> float:
+    """Return the length of the line through the points, in their order."""
+    return float(np.hypot(*np.diff(points, axis=0).T).sum())
+
+
+def chained_length(points: Array) -> float:
+    """Return the length of a line through the points, which may be in any order."""
+    return path_length(points[_chain(points)])
+
+
+def arc_length(points: Array) -> Array:
+    """Return the length of the line up to each point."""
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def order_of(raw: RawShape, points: Array, notes: list[str]) -> Array:
+    """Return the places of the points from clamp to tip; notes say what was mended.
+
+    Raises
+    ------
+    InputError
+        If several points stand at one place along the rod.
+    """
+    key = raw.s if raw.s is not None else raw.material
+    if key is not None:
+        order = np.argsort(key, kind="stable")
+        if np.any(np.diff(key[order]) <= 0.0):
+            raise InputError(
+                f"{raw.source}: has several points at one place along the rod: it is "
+                "no line; export the rod's centre line (or one edge) alone"
+            )
+        if np.any(np.diff(order) != 1):
+            notes.append("reordered")
+        # A material coordinate may run from the tip; the arc length may not.
+        if raw.s is None and _is_reversed(points[order]):
+            order = order[::-1]
+            notes.append("reversed")
+        return order
+    order = np.arange(len(points))
+    if path_length(points) > 1.2 * chained_length(points):
+        order = _chain(points)
+        notes.append("reordered")
+    if _is_reversed(points[order]):
+        order = order[::-1]
+        notes.append("reversed")
+    return order
+
+
+def _is_reversed(points: Array) -> bool:
+    """Return whether the last point lies at the clamp, and the first does not."""
+    first, last = np.hypot(*points[0]), np.hypot(*points[-1])
+    return bool(last < 0.05 * path_length(points) and last < 0.2 * first)
+
+
+def _chain(points: Array) -> Array:
+    """Order points as a line: from an end to the nearest left, over and over."""
+    if len(points) > 20_000:
+        return np.arange(len(points))
+    from scipy.spatial import cKDTree
+
+    # One of the two ends: the point farthest from the middle of all.
+    at = int(np.argmax(np.hypot(*(points - points.mean(axis=0)).T)))
+    tree, left = cKDTree(points), np.ones(len(points), dtype=bool)
+    order = []
+    for _ in range(len(points)):
+        order.append(at)
+        left[at] = False
+        count = 8
+        while left.any():
+            near = tree.query(points[at], k=min(count, len(points)))[1]
+            free = [k for k in np.atleast_1d(near) if left[k]]
+            if free:
+                at = int(free[0])
+                break
+            count *= 4
+    return np.array(order)
+
+
+def aligned(points: Array) -> tuple[Array, float]:
+    """Return the points from the clamp on, and how far they were turned, in rad."""
+    moved = points - points[0]
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    n = max(3, len(points) // 3)
+    s = np.concatenate([[0.0], np.cumsum(steps)])[:n]
+    # The root tangent from a cubic over the first third, steadier than one step.
+    basis = np.column_stack([s, s**2, s**3][: n - 1])
+    slope = np.linalg.lstsq(basis, moved[:n], rcond=None)[0][0]
+    turn = -math.atan2(slope[1], slope[0])
+    c, sn = math.cos(turn), math.sin(turn)
+    return moved @ np.array([[c, sn], [-sn, c]]), turn
