@@ -4,8 +4,44 @@ from .compare.compare import (
 from .compare.compare import (
     comparison_table as comparison_table,
 )
-from .fit.search import (
+from .fit.models import (
+    model_sentence as model_sentence,
+)
+from .fit.nuisance import (
+    NUISANCE_NAMES as NUISANCE_NAMES,
+)
+from .fit.nuisance import (
+    Nuisance as Nuisance,
+)
+from .fit.posterior import (
+    Posterior as Posterior,
+)
+from .fit.posterior import (
+    check_installed as check_installed,
+)
+from .fit.posterior import (
+    sample_posterior as sample_posterior,
+)
+from .fit.problem import (
+    common_support as common_support,
+)
+from .fit.result import (
+    FitResult as FitResult,
+)
+from .fit.result import (
+    write_fit as write_fit,
+)
+from .fit.runs import (
     fit_runs as fit_runs,
+)
+from .fit.runs import (
+    try_fit as try_fit,
+)
+from .fit.suspects import (
+    Suspect as Suspect,
+)
+from .fit.verdict import (
+    Verdict as Verdict,
 )
 from .report.build import (
     write_report as write_report,

@@ -9,7 +9,7 @@ from ..core.errors import StoreError
 from ..rig.bench.config import read_plan
 from ..rig.bench.template import write_templates
 from .compare.compare import compare_run, write_comparison
-from .fit.search import try_fit
+from .fit.runs import try_fit
 from .report import write_report
 from .runs.load import load_run
 from .twin.run import calibrate_twin, measure_twin, run_on_twin

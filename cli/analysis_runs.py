@@ -83,6 +83,7 @@ def fit(
         None, "--out", help="fit.json; in the first run folder if not given."
     ),
     field: str = typer.Option("magnet", "--field", help="magnet or uniform."),
+    model: str = typer.Option("rod", "--model", help="rod or solid."),
     free: list[str] = typer.Option(
         [],
         "--free",
@@ -91,8 +92,8 @@ def fit(
     hold: list[str] = typer.Option(
         [],
         "--hold",
-        help="Hold a nuisance: clamp_angle_deg, clamp_position_mm, frame_angle_deg, "
-        "scale_percent, magnet_percent, gap_mm, weight_percent, or all; repeatable.",
+        help="Hold a nuisance, such as gap_mm or side_percent (docs/analysis.md has "
+        "them all), or all; repeatable.",
     ),
     prior: list[str] = typer.Option(
         [], "--prior", help="Prior sd of a nuisance: NAME=SD; repeatable."
@@ -121,13 +122,20 @@ def fit(
     json: bool = JSON,
 ) -> None:
     """Fit the moduli with uncertainties; write fit.json."""
-    from ..analysis.fit.posterior import check_installed, sample_posterior
-    from ..analysis.fit.problem import common_support
-    from ..analysis.fit.search import fit_runs, write_fit
+    from ..analysis import (
+        check_installed,
+        common_support,
+        fit_runs,
+        sample_posterior,
+        write_fit,
+    )
     from ..analysis.paper.probe import from_probe_reading
     from ..sim import Support
 
     _choice(field, ("magnet", "uniform"), "--field")
+    _choice(model, ("rod", "solid"), "--model")
+    if (field, model) == ("uniform", "solid"):
+        raise InputError("--model solid needs the magnet's field; leave --field out")
     nuisance = _nuisance(hold, prior)
     if posterior:
         check_installed()
@@ -139,7 +147,7 @@ def fit(
     told = Support() if gravity_m_s2 else common_support(loaded)
     result = fit_runs(
         loaded,
-        model=field,
+        model="solid" if model == "solid" else field,
         free=free,
         nuisance=nuisance,
         support=_support(told, clamp_angle_deg, gravity_m_s2, load_factor),
@@ -178,8 +186,8 @@ def report(
     json: bool = JSON,
 ) -> None:
     """Write one self-contained HTML page, with the figures as PDF beside it."""
+    from ..analysis import try_fit
     from ..analysis.compare.compare import write_comparison
-    from ..analysis.fit.search import try_fit
     from ..analysis.report import write_report
     from ..analysis.report.figures import gmc_numbers
 
@@ -410,7 +418,7 @@ def _nuisance(hold: Sequence[str], prior: Sequence[str]) -> Any:
     """Return the priors with the named ones held or changed."""
     from dataclasses import replace
 
-    from ..analysis.fit.nuisance import NUISANCE_NAMES, Nuisance
+    from ..analysis import NUISANCE_NAMES, Nuisance
 
     values = dict.fromkeys(NUISANCE_NAMES if "all" in hold else hold, 0.0)
     for text in prior:

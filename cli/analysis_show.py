@@ -11,7 +11,7 @@ import typer
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ..analysis.fit.search import FitResult
+    from ..analysis import FitResult
 
 
 def print_comparison(table: pd.DataFrame) -> None:
@@ -49,19 +49,23 @@ def _cell(value: Any, form: str | None) -> str:
 def print_fit(result: FitResult, path: Path, posterior: dict[str, Any] | None) -> None:
     """Print what was fitted, how sure it is, and where it was written."""
     typer.echo(
-        f"{result.specimen.name}: {result.steps} steps, {result.model} field, "
-        f"reduced chi2 {result.chi2_reduced:.2f}, "
+        f"{result.specimen.name}: {result.steps} steps, model {result.model}, "
+        f"{result.rms_um:.2g} um RMS left, reduced chi2 {result.chi2_reduced:.2f}, "
         f"condition number {result.condition_number:.3g}"
     )
-    for name, value, sd in zip(
-        result.parameters, result.values, result.sd, strict=True
+    again = (*result.E_sd_statistical_MPa, *[math.nan] * len(result.parameters))
+    for name, value, sd, alone in zip(
+        result.parameters, result.values, result.sd, again, strict=False
     ):
         if name in result.not_identifiable:
             typer.echo(f"  {name:20} not identifiable")
         else:
+            noise = f"; +- {alone:.2g} statistical" if math.isfinite(alone) else ""
             typer.echo(
-                f"  {name:20} {value:.4g} +- {sd:.2g} ({100 * sd / value:.1f} %)"
+                f"  {name:20} {value:.4g} +- {sd:.2g} ({100 * sd / value:.1f} %{noise})"
             )
+    _print_budget(result)
+    _print_verdict(result)
     for k, name in enumerate(result.parameters):
         for m in range(k):
             value = result.correlation[k, m]
@@ -75,6 +79,8 @@ def print_fit(result: FitResult, path: Path, posterior: dict[str, Any] | None) -
         typer.echo(f"  {name} = {value:.4g} +- {sd:.2g} is what the data tell")
     for sentence in result.skipped:
         typer.echo(f"left out: {sentence}", err=True)
+    if posterior and posterior["doubt"]:
+        typer.echo(f"posterior: {posterior['doubt']}", err=True)
     if posterior:
         for name, low, middle, high in zip(
             posterior["parameters"],
@@ -85,3 +91,37 @@ def print_fit(result: FitResult, path: Path, posterior: dict[str, Any] | None) -
                 f"  posterior {name}: {middle:.4g} (95 %: {low:.4g} to {high:.4g})"
             )
     typer.echo(str(path))
+
+
+def _print_budget(result: FitResult) -> None:
+    """Say which nuisances the standard deviations are made of."""
+    count = len(result.E_MPa)
+    shares = [
+        f"{kind} {100.0 * max(share[:count]):.2g} %"
+        for kind, share in result.budget.items()
+        if max(share[:count]) > 0.001
+    ]
+    if shares:
+        typer.echo(f"  of the moduli's sd: {', '.join(shares[:6])}")
+
+
+def _print_verdict(result: FitResult) -> None:
+    """Say whether the model can be believed, and what would explain its misfit."""
+    from ..analysis import model_sentence
+
+    verdict = result.verdict
+    if verdict is None:
+        return
+    typer.echo(f"verdict: {verdict.verdict} (p = {verdict.p_value:.2g})")
+    for sentence in verdict.reasons:
+        typer.echo(f"  {sentence}")
+    title = "would explain it" if verdict.reasons else "no more than chance"
+    for suspect in verdict.suspects[:3]:
+        typer.echo(f"  {title}: {suspect.sentence()}")
+    pulls = verdict.pulls.items()
+    strong = [f"{of} {pull:+.1f}" for of, pull in pulls if abs(pull) > 2.0]
+    if strong:
+        typer.echo(f"  pulled by more than 2 sd: {', '.join(strong)}")
+    sentence = model_sentence(verdict.models)
+    if sentence:
+        typer.echo(f"  {sentence}")

@@ -11,8 +11,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 from run_the_twin_bench import run
 
-from magbend.analysis import fit_runs, load_run
-from magbend.analysis.fit.search import FitResult
+from magbend.analysis import FitResult, fit_runs, load_run
 
 
 def main(folder: Path) -> FitResult:

@@ -4,11 +4,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 from ...core.errors import InputError
+from ...core.specimen import Specimen
 
 FRAME_ANGLE_SD_DEG = 0.3
 """Taken where a photograph does not state how sure its clamp direction is."""
+
+SIDE_PERCENT = 1.0
+"""Taken where the specimen states no deviation: a calliper on a soft rod."""
+
+REMANENCE_PERCENT = 6.6
+"""Taken where the specimen states none: scatter of the paper's three rods of one recipe
+(GMC 2, 6 and 7 read 20.07, 19.19 and 21.82 mT)."""
+
+MAGNET_PERCENT = 10.0
+"""Taken where the rig file states none: its figure may be a catalogue's."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,21 +32,35 @@ class Nuisance:
     clamp_angle_deg : float
         Direction of the clamp against the field, of a run: half a degree each for the
         clamp and the axis of the magnet, as a square leaves them.
+    magnet_offset_mm : float
+        Place of the magnet's axis along the rod, of a run.
+    gap_mm : float
+        How much farther than stated the magnet stands, of a run; its readings were
+        taken there too.
+    scale_percent : float
+        Millimetres per pixel, of a run.
     clamp_position_mm : float
         Place of the measured frame across the rod, of a photograph.
     frame_angle_deg : float or None
         Direction of the measured frame, of a photograph, or of all that share a clamp.
         None takes what each states itself (``clamp_angle_sd_deg`` of ``frames.csv``).
-    scale_percent : float
-        Millimetres per pixel, of a run.
-    magnet_percent : float
-        Remanence of the magnet (so, calibration of the Tesla-meter), of a run; the
-        scatter of the readings comes on top.
-    gap_mm : float
-        How much farther than stated the magnet stands, of a run. The readings, taken at
-        the true gap, are kept: the remanence follows.
-    weight_percent : float
-        Weight of the rod, of a run.
+    magnet_percent : float or None
+        Remanence of the magnet about that of the rig file; None takes `MAGNET_PERCENT`.
+    meter_percent, meter_offset_mT : float
+        Gain and zero of the Tesla-meter.
+    side_percent : float or None
+        Side of the rod; the measured width is set against it. None takes what the
+        specimen states, else `SIDE_PERCENT`.
+    length_mm : float or None
+        Length of the rod, at its tip; the measured length is set against it. None takes
+        what the specimen states, else 0.1 mm.
+    joint_mm : float
+        Place of each joint.
+    remanence_percent : float or None
+        Remanence of the rod. None takes what the specimen states, else
+        `REMANENCE_PERCENT`.
+    density_percent : float
+        Density of the rod, where weight acts.
 
     Raises
     ------
@@ -43,19 +69,26 @@ class Nuisance:
     """
 
     clamp_angle_deg: float = 0.7
+    magnet_offset_mm: float = 0.5
+    gap_mm: float = 0.5
+    scale_percent: float = 0.2
     clamp_position_mm: float = 0.05
     frame_angle_deg: float | None = None
-    scale_percent: float = 0.2
-    magnet_percent: float = 0.5
-    gap_mm: float = 0.5
-    weight_percent: float = 0.0
+    magnet_percent: float | None = None
+    meter_percent: float = 1.0
+    meter_offset_mT: float = 0.2
+    side_percent: float | None = None
+    length_mm: float | None = None
+    joint_mm: float = 0.2
+    remanence_percent: float | None = None
+    density_percent: float = 2.0
 
     def __post_init__(self) -> None:
         for name in NUISANCE_NAMES:
             value = getattr(self, name)
-            if name == "frame_angle_deg" and value is None:
+            if value is None and name in _TOLD_BY_FILES:
                 continue
-            if not (math.isfinite(value) and value >= 0.0):
+            if value is None or not (math.isfinite(value) and value >= 0.0):
                 raise InputError(
                     f"prior of {name} must be zero (held) or above; "
                     f"instead received {value!r}"
@@ -67,5 +100,75 @@ class Nuisance:
             return self.frame_angle_deg
         return stated_deg if math.isfinite(stated_deg) else FRAME_ANGLE_SD_DEG
 
+    def of_rod(self, specimen: Specimen) -> dict[str, float]:
+        """Return the priors of one rod, with what its file states."""
+        side = _percent(specimen, "side_sd_mm", specimen.side_mm, SIDE_PERCENT)
+        remanence = _percent(
+            specimen, "remanence_sd_mT", specimen.remanence_mT, REMANENCE_PERCENT
+        )
+        length = getattr(specimen, "length_sd_mm", None)
+        told = {
+            "side_percent": side,
+            "remanence_percent": remanence,
+            "length_mm": 0.1 if length is None else length,
+        }
+        priors = {
+            name: stated if (own := getattr(self, name)) is None else own
+            for name, stated in told.items()
+        }
+        for joint in range(len(specimen.sections) - 1):
+            priors[f"joint_mm[{joint}]"] = self.joint_mm
+        return priors
+
+
+def _percent(specimen: Specimen, key: str, size: float, default: float) -> float:
+    stated = getattr(specimen, key, None)
+    return default if stated is None or not size else 100.0 * stated / abs(size)
+
 
 NUISANCE_NAMES = tuple(field.name for field in fields(Nuisance))
+_TOLD_BY_FILES = (
+    "frame_angle_deg", "magnet_percent", "side_percent", "length_mm",
+    "remanence_percent",
+)  # fmt: skip
+
+
+class Owner(NamedTuple):
+    """To what a measured line belongs: index of its photograph, run, rod and bench.
+
+    `frame` is the first photograph whose clamp direction, and so its error, is the
+    same. A number a run states (a reading, say) has no photograph: -1.
+    """
+
+    photograph: int
+    frame: int
+    run: int
+    rod: int
+    bench: int
+
+
+_SCOPES = {
+    "clamp_position_mm": "photograph",
+    "frame_angle_deg": "frame",
+    "clamp_angle_deg": "run",
+    "magnet_offset_mm": "run",
+    "gap_mm": "run",
+    "scale_percent": "run",
+    "magnet_percent": "bench",
+    "meter_percent": "bench",
+    "meter_offset_mT": "bench",
+}
+
+
+def scope_of(name: str) -> str:
+    """Return which index of `Owner` a nuisance counts by; the rod's if nothing else."""
+    return _SCOPES.get(name, "rod")
+
+
+def unit_of(name: str) -> str:
+    """Return the unit that ends a name: ``joint_mm[1]`` is in mm."""
+    base = name.partition("[")[0]
+    if base.endswith("_per_mm"):
+        return "1/mm"
+    unit = base.rpartition("_")[2]
+    return {"percent": "%"}.get(unit, unit if unit in ("mm", "deg", "mT", "T") else "")

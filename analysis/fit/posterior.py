@@ -18,9 +18,12 @@ from numpy.typing import NDArray
 from ...core.errors import InputError, MagbendError, MissingExtraError
 from ...core.progress import Progress, silent
 from .residuals import misfit, residuals
-from .search import PRIOR_RANGE_MPA, FitResult
+from .result import PRIOR_RANGE_MPA, FitResult
 
 Array = NDArray[np.float64]
+
+LONG_ENOUGH = 50.0
+"""Autocorrelation times that a chain must last (emcee's own advice)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,12 +41,31 @@ class Posterior:
     autocorrelation : float
         Longest integrated autocorrelation time in steps, NaN if the chain is too short
         to tell.
+    steps : int
+        Of each walker.
     """
 
     parameters: tuple[str, ...]
     samples: Array
     acceptance: float
     autocorrelation: float
+    steps: int
+
+    @property
+    def doubt(self) -> str:
+        """A sentence on chains that are too short to be believed, else empty."""
+        needed = LONG_ENOUGH * self.autocorrelation
+        if self.steps >= needed:
+            return ""
+        if not math.isfinite(needed):
+            return (
+                f"{self.steps} steps are too few even to tell how long the chains must "
+                "be: the quantiles are not to be believed; ask for ten times as many"
+            )
+        return (
+            f"{self.steps} steps are too few: neighbouring samples agree over "
+            f"{self.autocorrelation:.0f} steps; ask for {math.ceil(needed)} or more"
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Return quantiles for a machine."""
@@ -56,6 +78,7 @@ class Posterior:
             "acceptance": self.acceptance,
             "autocorrelation_steps": self.autocorrelation,
             "samples": len(self.samples),
+            "doubt": self.doubt,
         }
 
 
@@ -120,7 +143,6 @@ def sample_posterior(
     nuisance = jacobian[:, p:]
     inner = np.linalg.inv(np.eye(nuisance.shape[1]) + nuisance.T @ nuisance)
     held = np.zeros(problem.size)
-    scale = 1.0 / max(1.0, result.chi2_reduced)
 
     stopped: list[KeyboardInterrupt] = []
 
@@ -134,7 +156,7 @@ def sample_posterior(
             stopped.append(stop)  # emcee would print a traceback; told below
             return -math.inf
         seen = nuisance.T @ data
-        chi2 = float(data @ data - seen @ inner @ seen) * scale
+        chi2 = float(data @ data - seen @ inner @ seen)
         return -0.5 * (chi2 + float(np.sum(((u - centre) / width) ** 2)))
 
     rng = np.random.default_rng(seed)
@@ -154,4 +176,5 @@ def sample_posterior(
         samples=nominal * np.exp(chain),
         acceptance=float(np.mean(sampler.acceptance_fraction)),
         autocorrelation=float(np.max(sampler.get_autocorr_time(quiet=True, tol=0))),
+        steps=steps,
     )

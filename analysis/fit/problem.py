@@ -1,4 +1,4 @@
-"""What is fitted: the measured lines of steps and runs, the unknowns and their priors.
+"""What is fitted: measured lines and numbers of runs, the unknowns and their priors.
 
 Unknowns are dimensionless: moduli, remanences and the load factor by their logarithm
 (relative to the nominal value), nuisance parameters in units of their prior standard
@@ -17,27 +17,37 @@ from numpy.typing import NDArray
 from ... import sim
 from ...core.centreline import Centreline
 from ...core.errors import InputError, StoreError
-from ...core.magnet import Magnet
 from ...core.specimen import Specimen
-from ..compare.compare import field_of, fit_run_magnet, frame_problem, remanence_sd_T
+from ..compare.compare import field_of, frame_problem, usable_flux
 from ..runs.load import RunData, Step
-from .nuisance import Nuisance
+from .noise import FLOOR_MM, mode_matrix, spectrum, stated_mm
+from .nuisance import MAGNET_PERCENT, Nuisance, Owner, scope_of
 
 Array = NDArray[np.float64]
 
-MODEL_SD_MM = {"magnet": 1e-4, "uniform": 0.1}
-"""What a shape is off by in the field model alone, besides the measured line's own
-standard deviation. A uniform field is wrong by tenths of a millimetre."""
+MODELS = ("magnet", "uniform", "solid")
+"""The cube's field, the flux at the tip everywhere, and the cube's with a solid rod."""
 
 UNKNOWN_SIGMA_MM = 0.05
 """Standard deviation taken where the centreline has none."""
 
-START_SHARED_MM = 8.0
-"""Over which a line's points share their error, to start with: long, so that the priors
-hold the nuisances and what they cannot explain stays in the residuals to be seen."""
+WIDTH_PERCENT = 0.7
+"""How sure a measured width is: light and shade at its edges err alike in all frames of
+a run; 0.4 % on photographs of the twin bench."""
+
+LENGTH_MM = 0.05
+"""How sure a measured length is."""
+
+READING_PERCENT = 0.2
+"""What a reading scatters by besides its samples: the probe is put back by hand."""
 
 FREE_NAMES = ("remanence_mT", "load_factor", "magnet_remanence_T")
 """What may be fitted besides the moduli, without a prior."""
+
+_FREED = {
+    "remanence_mT": "remanence_percent",
+    "magnet_remanence_T": "magnet_percent",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,83 +56,87 @@ class Shot:
 
     Attributes
     ----------
-    run, step, frame : int
-        Index in the problem of the run, of the shot, and of the first shot whose
-        photograph has the same clamp direction, and so the same error of it.
     normals : ndarray, shape (n, 2)
         Unit normals of the measured line, to its left.
     sigma_mm : ndarray, shape (n,)
-        Standard deviation of each point across the line.
-    sd_mm : ndarray, shape (n,)
-        The same, widened so that the points count as independent.
+        Stated standard deviation of each point across the line.
+    modes : ndarray, shape (m, n)
+        From points across the line to modes (`noise.mode_matrix`).
+    noise_mm : float
+        Size of the errors of the first mode.
     frame_sd_deg : float
         How sure the photograph is of its clamp direction; NaN if it does not say.
-    remanence_per_mm : float
-        Relative change of the magnet's remanence that keeps the run's readings if the
-        magnet stands one mm farther.
+    flags : tuple of str
+        Doubts of its measurement.
     """
 
-    run: int
-    step: int
-    frame: int
+    owner: Owner
     label: str
     specimen: Specimen
     field: sim.UniformField | sim.MagnetField
     line: Centreline
     normals: Array
     sigma_mm: Array
-    sd_mm: Array
+    modes: Array
+    noise_mm: float
     frame_sd_deg: float
-    remanence_per_mm: float
-
-    def holder(self, nuisance: str) -> int:
-        """Return the index of what a nuisance of this shot belongs to."""
-        own = {"clamp_position_mm": self.step, "frame_angle_deg": self.frame}
-        return own.get(nuisance, self.run)
+    flags: tuple[str, ...]
 
     @property
-    def spacing_mm(self) -> float:
-        """Distance of neighbouring points."""
-        return self.line.length_mm / (len(self.line.s_mm) - 1)
+    def row_sd_mm(self) -> Array:
+        """Standard deviation of each mode, shape (m,)."""
+        return np.hypot(self.noise_mm * spectrum(len(self.modes)), FLOOR_MM)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Datum:
+    """A number that a run states besides its lines.
+
+    Attributes
+    ----------
+    kind : {"flux_mT", "width_mm", "length_mm"}
+    value, sd : float
+        In the unit of the kind.
+    shot : Shot
+        One of the run, for its rod; a reading has the field of its own step.
+    """
+
+    kind: str
+    owner: Owner
+    value: float
+    sd: float
+    specimen: Specimen
+    field: sim.MagnetField | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Problem:
-    """All shots of a fit, its unknowns and their order.
+    """All lines and numbers of a fit, its unknowns and their order.
 
     Attributes
     ----------
     names : tuple of str
         Unknowns asked for: ``E_MPa[i]`` root first, then those of `FREE_NAMES`.
-    nuisances : tuple of str
-        Unknowns with a prior: a name of `NUISANCE_NAMES`, and the run or shot it is of.
+    nuisances : tuple of (str, int)
+        Unknowns with a prior, and the run, rod, ... (`nuisance.scope_of`) each is of.
     nuisance_sd : ndarray, shape (q,)
         Standard deviations of their priors, in their own units.
-    shared_mm : float
-        Over which neighbouring points of a line share their error.
     """
 
     specimen: Specimen
     shots: tuple[Shot, ...]
+    data: tuple[Datum, ...]
     support: sim.Support
+    model: str
     names: tuple[str, ...]
     nuisances: tuple[tuple[str, int], ...]
     nuisance_sd: Array
-    shared_mm: float
     skipped: tuple[str, ...]
 
     @property
     def size(self) -> int:
         """Number of unknowns."""
         return len(self.names) + len(self.nuisances)
-
-    @property
-    def independent_points(self) -> float:
-        """How many points count, those that share their error once."""
-        return sum(
-            len(shot.sd_mm) * float(np.mean((shot.sigma_mm / shot.sd_mm) ** 2))
-            for shot in self.shots
-        )
 
     def nominal(self, name: str) -> float:
         """Return the nominal value of an unknown that is asked for."""
@@ -135,6 +149,33 @@ class Problem:
         field = self.shots[0].field
         return field.magnet.remanence_T if isinstance(field, sim.MagnetField) else 1.0
 
+    def held_by(self, owner: Owner) -> list[tuple[int, str]]:
+        """Return index and name of the unknowns that something of `owner` feels."""
+        p = len(self.names)
+        return [
+            *enumerate(self.names),
+            *(
+                (p + k, name)
+                for k, (name, index) in enumerate(self.nuisances)
+                if getattr(owner, scope_of(name)) == index
+            ),
+        ]
+
+    def value(self, k: int, unknown: float) -> float:
+        """Return what unknown `k` is in its own unit."""
+        p = len(self.names)
+        if k < p:
+            return self.nominal(self.names[k]) * math.exp(unknown)
+        return unknown * float(self.nuisance_sd[k - p])
+
+    def label(self, k: int) -> str:
+        """Return the name of nuisance `k`, with the photograph or run it is of."""
+        name, index = self.nuisances[k]
+        if scope_of(name) in ("photograph", "frame"):
+            return f"{name} ({self.shots[index].label})"
+        many = sum(other == name for other, _ in self.nuisances) > 1
+        return f"{name} ({scope_of(name)} {index + 1})" if many else name
+
 
 def build_problem(
     runs: Sequence[RunData],
@@ -143,7 +184,6 @@ def build_problem(
     free: Sequence[str] = (),
     nuisance: Nuisance | None = None,
     support: sim.Support | None = None,
-    shared_mm: float = START_SHARED_MM,
 ) -> Problem:
     """Collect the shots of one or several runs of the same material.
 
@@ -152,76 +192,64 @@ def build_problem(
     runs : sequence of RunData
         Specimens may differ in side and unit lengths, not in their nominal moduli: one
         set of moduli is fitted to all.
-    model : {"magnet", "uniform"}
-        Field model.
+    model : {"magnet", "uniform", "solid"}
+        Of `MODELS`.
     free : sequence of str
         Of `FREE_NAMES`: fitted besides the moduli, without a prior.
     nuisance : Nuisance, optional
         Priors of the nuisance parameters.
     support : Support, optional
         Nominal clamp angle, weight and load factor.
-    shared_mm : float
-        Over which neighbouring points of a measured line share their error.
 
     Raises
     ------
     InputError
-        If a name is unknown, or the weight is asked for and there is none.
+        If a name is unknown.
     StoreError
         If the runs are of different materials or no step can be used.
     """
     nuisance = nuisance or Nuisance()
     support = support or common_support(runs)
-    _check(runs, free, nuisance, support)
-    shots: list[Shot] = []
-    frames: dict[tuple[int, str], int] = {}
-    skipped: list[str] = []
-    magnet_sd: list[float] = []
-    for index, run in enumerate(runs):
-        fit, magnet = fit_run_magnet(run)
-        relative = remanence_sd_T(fit) / fit.remanence_T if fit else 0.0
-        magnet_sd.append(math.hypot(100.0 * relative, nuisance.magnet_percent))
-        slope = _remanence_per_mm(run)
-        for step in run.steps:
-            seen = run.frame(step)
-            clamp = (index, seen.shared_clamp if seen else "")
-            first = frames.get(clamp, len(shots))
-            shot = _shot(run, step, (index, len(shots), first), model, magnet, slope)
-            if isinstance(shot, str):
-                skipped.append(f"{run.label}, step {step.index}: {shot}")
-            else:
-                shots.append(shot)
-                if clamp[1]:
-                    frames[clamp] = first
+    _check(runs, model, free, support)
+    shots, data, skipped = _collect(runs, model)
     if not shots:
         raise StoreError(f"no step can be fitted; the first: {skipped[0]}")
-    if "magnet_remanence_T" in free:
-        nuisance = replace(nuisance, magnet_percent=0.0)
-    nuisances, sds = _nuisances(runs, shots, nuisance, magnet_sd)
+    held = {_FREED[name]: 0.0 for name in free if name in _FREED}
+    if not any(support.gravity_m_s2):
+        held["density_percent"] = 0.0
+    priors = _priors(runs, shots, replace(nuisance, **held))
     sections = range(len(runs[0].specimen.sections))
-    problem = Problem(
+    return Problem(
         specimen=runs[0].specimen,
         shots=tuple(shots),
+        data=tuple(data),
         support=support,
+        model=model,
         names=(*(f"E_MPa[{i}]" for i in sections), *free),
-        nuisances=tuple(nuisances),
-        nuisance_sd=np.array(sds),
-        shared_mm=shared_mm,
+        nuisances=tuple(priors),
+        nuisance_sd=np.array(list(priors.values())),
         skipped=tuple(skipped),
     )
-    return with_shared(problem, shared_mm)
 
 
-def with_shared(problem: Problem, shared_mm: float) -> Problem:
-    """Return the problem with lines whose points within `shared_mm` count once."""
+def with_noise(problem: Problem, noise_mm: Array) -> Problem:
+    """Return the problem with lines that err by `noise_mm` in their first mode."""
     shots = tuple(
-        replace(
-            shot,
-            sd_mm=shot.sigma_mm * math.sqrt(max(1.0, shared_mm / shot.spacing_mm)),
-        )
-        for shot in problem.shots
+        replace(shot, noise_mm=float(size))
+        for shot, size in zip(problem.shots, noise_mm, strict=True)
     )
-    return replace(problem, shots=shots, shared_mm=shared_mm)
+    return replace(problem, shots=shots)
+
+
+def with_prior(problem: Problem, name: str, index: int, sd: float) -> Problem:
+    """Return the problem with another prior of one nuisance, which may be new."""
+    priors = dict(zip(problem.nuisances, problem.nuisance_sd.tolist(), strict=True))
+    priors[(name, index)] = sd
+    return replace(
+        problem,
+        nuisances=tuple(priors),
+        nuisance_sd=np.array(list(priors.values())),
+    )
 
 
 def common_support(runs: Sequence[RunData]) -> sim.Support:
@@ -244,16 +272,17 @@ def common_support(runs: Sequence[RunData]) -> sim.Support:
 
 
 def _check(
-    runs: Sequence[RunData],
-    free: Sequence[str],
-    nuisance: Nuisance,
-    support: sim.Support,
+    runs: Sequence[RunData], model: str, free: Sequence[str], support: sim.Support
 ) -> None:
     unknown = [name for name in free if name not in FREE_NAMES]
     if unknown:
         raise InputError(
             f"free parameter must be one of {', '.join(FREE_NAMES)}; "
             f"instead received {unknown[0]!r}"
+        )
+    if model not in MODELS:
+        raise InputError(
+            f"model must be one of {', '.join(MODELS)}; instead received {model!r}"
         )
     moduli = [tuple(section.E_MPa for section in run.specimen.sections) for run in runs]
     for run, other in zip(runs, moduli, strict=True):
@@ -262,89 +291,128 @@ def _check(
                 f"{run.path}: its specimen {run.specimen.name!r} has other nominal "
                 f"moduli than {runs[0].specimen.name!r}: fit the two separately"
             )
-    heavy = any(support.gravity_m_s2)
-    if nuisance.weight_percent and not heavy:
-        raise InputError(
-            "the weight can only be a nuisance where there is weight; give "
-            "gravity_m_s2 and a specimen with density_kg_m3"
-        )
     for run in runs:
-        if heavy and run.specimen.density_kg_m3 is None:
+        if any(support.gravity_m_s2) and run.specimen.density_kg_m3 is None:
             raise StoreError(
                 f"{run.path}: the specimen has no density_kg_m3, which its weight needs"
             )
 
 
-def _remanence_per_mm(run: RunData) -> float:
-    """Return how much stronger, per mm, the magnet is if it stands farther away."""
-    near, far = (fit_run_magnet(run, farther_mm=shift)[0] for shift in (-0.1, 0.1))
-    if near is None or far is None:
-        return 0.0
-    return math.log(far.remanence_T / near.remanence_T) / 0.2
+def _collect(
+    runs: Sequence[RunData], model: str
+) -> tuple[list[Shot], list[Datum], list[str]]:
+    shots: list[Shot] = []
+    data: list[Datum] = []
+    skipped: list[str] = []
+    rods = _firsts([run.specimen for run in runs])
+    benches = _firsts([run.magnet for run in runs])
+    for index, run in enumerate(runs):
+        nobody = Owner(-1, -1, index, rods[index], benches[index])
+        first = len(shots)
+        frames: dict[str, int] = {}
+        for step in run.steps:
+            found = _shot(run, step, model, nobody._replace(photograph=len(shots)))
+            if isinstance(found, str):
+                skipped.append(f"{run.label}, step {step.index}: {found}")
+                continue
+            seen = run.frame(step)
+            clamp = seen.shared_clamp if seen else ""
+            frame = frames.setdefault(clamp, len(shots)) if clamp else len(shots)
+            shots.append(replace(found, owner=found.owner._replace(frame=frame)))
+        data += _readings(run, nobody)
+        if len(shots) > first:
+            data += _sizes(run, nobody)
+    return shots, data, skipped
 
 
-def _shot(
-    run: RunData, step: Step, indices: tuple[int, int, int], model: str,
-    magnet: Magnet | None, remanence_per_mm: float,
-) -> Shot | str:  # fmt: skip
+def _firsts(things: Sequence[object]) -> list[int]:
+    """Return for each the index of the first that is equal to it."""
+    return [list(things).index(thing) for thing in things]
+
+
+def _shot(run: RunData, step: Step, model: str, owner: Owner) -> Shot | str:
     frame = run.frame(step)
     problem = frame_problem(frame, run.specimen)
-    field = field_of(step, model, magnet)
+    # Where a magnet is known, `uniform` is its flux at the tip, taken everywhere.
+    known = "magnet" if run.magnet or model != "uniform" else "uniform"
+    field = field_of(step, known, run.magnet)
     if problem or isinstance(field, str):
         return problem or str(field)
     if frame is None or frame.centreline is None:
         return "no centreline"
     line = frame.centreline
-    inside = line.s_mm <= run.specimen.length_mm * (1.0 + 1e-9)
     stated = np.where(np.isfinite(frame.sigma_mm), frame.sigma_mm, UNKNOWN_SIGMA_MM)
-    sigma = np.hypot(stated[inside], MODEL_SD_MM[model])
-    theta = line.theta_rad[inside]
     return Shot(
-        run=indices[0],
-        step=indices[1],
-        frame=indices[2],
+        owner=owner,
         label=f"{run.label}, step {step.index}",
         specimen=run.specimen,
         field=field,
-        line=Centreline(
-            **{
-                name: getattr(line, name)[inside]
-                for name in ("s_mm", "x_mm", "y_mm", "theta_rad", "kappa_per_mm")
-            }
-        ),
-        normals=np.column_stack([-np.sin(theta), np.cos(theta)]),
-        sigma_mm=sigma,
-        sd_mm=sigma,
+        line=line,
+        normals=np.column_stack([-np.sin(line.theta_rad), np.cos(line.theta_rad)]),
+        sigma_mm=stated,
+        modes=mode_matrix(line.s_mm),
+        noise_mm=stated_mm(stated),
         frame_sd_deg=frame.clamp_angle_sd_deg,
-        remanence_per_mm=remanence_per_mm,
+        flags=frame.flags,
     )
 
 
-def _nuisances(
-    runs: Sequence[RunData],
-    shots: Sequence[Shot],
-    nuisance: Nuisance,
-    magnet_sd: Sequence[float],
-) -> tuple[list[tuple[str, int]], list[float]]:
-    nuisances: list[tuple[str, int]] = []
-    sds: list[float] = []
+def _readings(run: RunData, owner: Owner) -> list[Datum]:
+    if run.magnet is None:
+        return []
+    data = []
+    for step in run.steps:
+        if usable_flux(step):
+            own = step.flux_sd_mT if math.isfinite(step.flux_sd_mT) else 0.0
+            sd = math.hypot(own, READING_PERCENT / 100.0 * step.flux_mT)
+            field = sim.MagnetField(magnet=run.magnet, gap_mm=step.gap_mm)
+            data.append(
+                Datum(kind="flux_mT", owner=owner, value=step.flux_mT, sd=sd,
+                      specimen=run.specimen, field=field)
+            )  # fmt: skip
+    return data
 
-    def add(name: str, index: int, sd: float) -> None:
-        if sd > 0.0:
-            nuisances.append((name, index))
-            sds.append(sd)
 
-    magnets = {s.run for s in shots if isinstance(s.field, sim.MagnetField)}
-    for index in range(len(runs)):
-        add("clamp_angle_deg", index, nuisance.clamp_angle_deg)
-        add("scale_percent", index, nuisance.scale_percent)
-        add("weight_percent", index, nuisance.weight_percent)
-        if nuisance.magnet_percent:
-            add("magnet_percent", index, magnet_sd[index])
-        if index in magnets:
-            add("gap_mm", index, nuisance.gap_mm)
+def _sizes(run: RunData, owner: Owner) -> list[Datum]:
+    """Width and length of the rod as its photographs show them, one value a run."""
+    frames = [f for f in map(run.frame, run.steps) if f is not None and f.centreline]
+    lengths = [f.centreline.length_mm for f in frames if f.centreline]
+    widths = [f.width_mm for f in frames if math.isfinite(f.width_mm)]
+    values = [("length_mm", float(np.mean(lengths)), LENGTH_MM)]
+    if widths:
+        width_mm = float(np.median(widths))
+        values.append(("width_mm", width_mm, WIDTH_PERCENT / 100.0 * width_mm))
+    return [
+        Datum(kind=kind, owner=owner, value=value, sd=sd, specimen=run.specimen)
+        for kind, value, sd in values
+    ]
+
+
+def _priors(
+    runs: Sequence[RunData], shots: Sequence[Shot], nuisance: Nuisance
+) -> dict[tuple[str, int], float]:
+    """Return the standard deviation of every nuisance that is not held."""
+    priors: dict[tuple[str, int], float] = {}
     for shot in shots:
-        add("clamp_position_mm", shot.step, nuisance.clamp_position_mm)
-        if shot.frame == shot.step:
-            add("frame_angle_deg", shot.frame, nuisance.frame_sd_deg(shot.frame_sd_deg))
-    return nuisances, sds
+        run, owner = runs[shot.owner.run], shot.owner
+        sds = {
+            name: getattr(nuisance, name)
+            for name in (
+                "clamp_angle_deg", "scale_percent", "clamp_position_mm",
+                "density_percent",
+            )
+        }  # fmt: skip
+        sds |= nuisance.of_rod(shot.specimen)
+        if owner.frame == owner.photograph:
+            sds["frame_angle_deg"] = nuisance.frame_sd_deg(shot.frame_sd_deg)
+        if run.magnet is not None:
+            told = nuisance.magnet_percent
+            sds["magnet_percent"] = MAGNET_PERCENT if told is None else told
+        for name in ("meter_percent", "meter_offset_mT", "gap_mm"):
+            sds[name] = getattr(nuisance, name)
+        if isinstance(shot.field, sim.MagnetField):
+            sds["magnet_offset_mm"] = nuisance.magnet_offset_mm
+        for name, sd in sds.items():
+            if sd > 0.0:
+                priors[(name, getattr(owner, scope_of(name)))] = sd
+    return priors

@@ -27,7 +27,8 @@ from ..compare.compare import (
     comparison_table,
     write_comparison,
 )
-from ..fit.search import FitResult, try_fit, write_fit
+from ..fit.result import FitResult, write_fit
+from ..fit.runs import try_fit
 from ..report import write_report
 from ..report.figures import PANELS, gmc_numbers
 from ..runs.load import load_run

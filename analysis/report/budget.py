@@ -18,7 +18,7 @@ from ...core.errors import MagbendError
 from ...core.specimen import Specimen
 from ..compare.compare import Comparison, RunComparison, remanence_sd_T, usable_flux
 from ..fit.nuisance import FRAME_ANGLE_SD_DEG, Nuisance
-from ..fit.search import FitResult
+from ..fit.result import FitResult
 
 ASSUMED = {
     "side_percent": 1.0,

@@ -15,7 +15,8 @@ from ...core.errors import MagbendError, StoreError
 from ...core.files import write_bytes, write_text
 from ...core.progress import Progress, silent
 from ..compare.compare import MODELS, Comparison, RunComparison
-from ..fit.search import FitResult
+from ..fit.models import model_sentence
+from ..fit.result import FitResult
 from ..runs.load import Step
 from . import figures
 from .budget import BudgetLine, tip_budget
@@ -280,7 +281,22 @@ def _fit_context(fit: FitResult | None) -> dict[str, Any] | None:
         }
         for name, value, sd in zip(fit.parameters, fit.values, fit.sd, strict=True)
     ]
-    return {"result": fit, "rows": rows, "correlation": fit.correlation.tolist()}
+    shares = [
+        f"{kind} {100.0 * float(max(share[: len(fit.E_MPa)])):.1f} %"
+        for kind, share in list(fit.budget.items())[:5]
+    ]
+    verdict = fit.verdict
+    pulls = verdict.pulls.items() if verdict else ()
+    return {
+        "result": fit,
+        "rows": rows,
+        "correlation": fit.correlation.tolist(),
+        "budget": ", ".join(shares) or "none, all are held",
+        "verdict": verdict,
+        "p_value": f"{verdict.p_value:.2g}" if verdict else "",
+        "pulls": ", ".join(f"{of} {pull:+.1f}" for of, pull in pulls if abs(pull) > 2),
+        "models": model_sentence(verdict.models) if verdict else "",
+    }
 
 
 def _budget(run: RunComparison, fit: FitResult | None) -> list[dict[str, Any]]:

@@ -12,7 +12,7 @@ import numpy as np
 from ...sim import magnet_flux_mT
 from ..compare.compare import MODELS, Comparison, RunComparison
 from ..compare.metrics import position_at
-from ..fit.search import FitResult
+from ..fit.result import FitResult
 from .style import (
     BAD,
     FAINT,

@@ -100,7 +100,7 @@ def test_weight_is_taken_from_the_run_unless_it_is_given(tmp_path: Path) -> None
 def test_runs_of_benches_that_stand_otherwise_are_not_fitted_as_one(
     tmp_path: Path,
 ) -> None:
-    from magbend.analysis.fit.search import fit_runs
+    from magbend.analysis.fit.runs import fit_runs
 
     heavy = replace(sim.gmc(2), density_kg_m3=2640.0)
     paths = [write_run(tmp_path / name, specimen=heavy) for name in "ab"]

@@ -13,23 +13,20 @@ from analysis_factory import MAGNET, write_run
 
 from magbend import sim
 from magbend.analysis import fit_runs, load_run
-from magbend.analysis.fit.nuisance import Nuisance
+from magbend.analysis.fit.nuisance import NUISANCE_NAMES, Nuisance
 from magbend.analysis.fit.problem import build_problem
 from magbend.analysis.fit.residuals import residuals
-from magbend.analysis.fit.search import write_fit
+from magbend.analysis.fit.result import write_fit
 from magbend.analysis.twin.bench import hide
 from magbend.analysis.twin.run import bench_run
 from magbend.core.errors import InputError, SolverError, StoreError
 from magbend.core.specimen import Specimen
 
-HELD = Nuisance(
-    clamp_angle_deg=0.0,
-    clamp_position_mm=0.0,
-    frame_angle_deg=0.0,
-    scale_percent=0.0,
-    magnet_percent=0.0,
-    gap_mm=0.0,
-)
+HELD = Nuisance(**dict.fromkeys(NUISANCE_NAMES, 0.0))
+
+
+AS_HIDDEN = replace(Nuisance(), remanence_percent=0.0, side_percent=0.0)
+"""What `noisy_run` and the twin do not hide must not widen the intervals."""
 
 
 def hidden(nominal: Specimen, *factors: float) -> Specimen:
@@ -74,31 +71,12 @@ def coverage(folder: Path, seeds: range) -> tuple[float, float, int]:
     scores = []
     for seed in seeds:
         path, truth = noisy_run(folder / str(seed), seed)
-        fit = fit_runs([load_run(path)])
+        fit = fit_runs([load_run(path)], nuisance=AS_HIDDEN, judged=False)
         for k, section in enumerate(truth.sections):
             if f"E_MPa[{k}]" not in fit.not_identifiable:
                 scores.append((fit.E_MPa[k] - section.E_MPa) / fit.E_sd_MPa[k])
     z = np.abs(scores)
     return float(np.mean(z < 1.96)), float(np.mean(z < 1.0)), len(z)
-
-
-@pytest.mark.parametrize("shared_mm", [1.0, 4.0])
-def test_residuals_show_how_far_a_line_shares_its_error(
-    tmp_path: Path, shared_mm: float
-) -> None:
-    """The integral of exp(-d^2 / (2 r^2)) over both sides is r sqrt(2 pi)."""
-    rng = np.random.default_rng(3)
-    runs = [
-        load_run(
-            write_run(
-                tmp_path / str(k), sigma_mm=0.01, rng=rng, points=121,
-                reach_mm=shared_mm / math.sqrt(2.0 * math.pi),
-            )
-        )
-        for k in range(4)
-    ]  # fmt: skip
-    fit = fit_runs(runs)
-    assert fit.problem.shared_mm == pytest.approx(shared_mm, rel=0.35)
 
 
 def test_a_photograph_that_knows_its_direction_narrows_the_interval(
@@ -108,7 +86,7 @@ def test_a_photograph_that_knows_its_direction_narrows_the_interval(
     for stated_deg in (0.02, 0.5, math.nan):
         path = tmp_path / str(stated_deg)
         write_run(path, sigma_mm=0.01, clamp_angle_sd_deg=stated_deg)
-        fit = fit_runs([load_run(path)], shared_mm=2.0)
+        fit = fit_runs([load_run(path)], judged=False)
         priors = {n["prior_sd"] for n in fit.nuisance if n["name"] == "frame_angle_deg"}
         assert priors == {stated_deg if math.isfinite(stated_deg) else 0.3}
         sds.append(fit.E_sd_MPa[0])
@@ -165,7 +143,7 @@ def test_intervals_hold_on_photographs(tmp_path: Path) -> None:
         run = load_run(tmp_path / str(k))
         assert run.magnet is not None
         truth = hide(run.specimen, run.magnet, seed=1000 + k).specimen
-        fit = fit_runs([run])
+        fit = fit_runs([run], nuisance=AS_HIDDEN, judged=False)
         for i, section in enumerate(truth.sections):
             if f"E_MPa[{i}]" not in fit.not_identifiable:
                 z.append((fit.E_MPa[i] - section.E_MPa) / fit.E_sd_MPa[i])
@@ -209,7 +187,6 @@ def test_jacobian_is_that_of_the_residuals(tmp_path: Path, shared: str) -> None:
     problem = build_problem(
         [load_run(path)],
         free=["remanence_mT", "load_factor", "magnet_remanence_T"],
-        nuisance=Nuisance(weight_percent=2.0),
         support=support,
     )
     rng = np.random.default_rng(1)
@@ -292,14 +269,14 @@ def test_bounds_order_and_prior_are_kept(tmp_path: Path) -> None:
     bounded = fit_runs([run], nuisance=HELD, bounds_MPa=(12.0, 16.0))
     assert min(bounded.E_MPa) >= 12.0 - 1e-9
     assert max(bounded.E_MPa) <= 16.0 + 1e-9
-    prior = fit_runs([run], prior_MPa=(8.0, 50.0), shared_mm=2.0)
-    assert prior.E_sd_MPa[2] <= fit_runs([run], shared_mm=2.0).E_sd_MPa[2]
+    prior = fit_runs([run], prior_MPa=(8.0, 50.0), judged=False)
+    assert prior.E_sd_MPa[2] <= fit_runs([run], judged=False).E_sd_MPa[2]
 
 
 def test_widening_a_prior_widens_the_intervals(tmp_path: Path) -> None:
     run = load_run(write_run(tmp_path / "a", sigma_mm=0.01))
-    narrow = fit_runs([run], nuisance=HELD)
-    wide = fit_runs([run], nuisance=Nuisance(magnet_percent=5.0))
+    narrow = fit_runs([run], nuisance=HELD, judged=False)
+    wide = fit_runs([run], nuisance=replace(HELD, remanence_percent=5.0), judged=False)
     assert all(b > a for a, b in zip(narrow.E_sd_MPa, wide.E_sd_MPa, strict=True))
     assert wide.E_sd_MPa[0] / wide.E_MPa[0] > 0.045
 
@@ -310,7 +287,6 @@ def test_uniform_field_shifts_the_moduli(tmp_path: Path) -> None:
     uniform, magnet = fit_runs([run], model="uniform"), fit_runs([run])
     assert magnet.E_MPa[0] == pytest.approx(20.0, rel=0.05)
     assert uniform.E_MPa[0] > 1.05 * magnet.E_MPa[0]
-    assert uniform.E_sd_MPa[0] > magnet.E_sd_MPa[0]
 
 
 def test_failed_frames_are_left_out_and_named(tmp_path: Path) -> None:
@@ -340,8 +316,8 @@ def test_what_cannot_be_is_refused(tmp_path: Path) -> None:
         fit_runs([run], free=["colour"])
     with pytest.raises(InputError, match="bounds_MPa"):
         fit_runs([run], bounds_MPa=(50.0, 8.0))
-    with pytest.raises(InputError, match="weight"):
-        fit_runs([run], nuisance=Nuisance(weight_percent=1.0))
+    with pytest.raises(InputError, match="model must be one of"):
+        fit_runs([run], model="plate")
     with pytest.raises(InputError, match="prior of scale_percent"):
         Nuisance(scale_percent=-1.0)
     other = load_run(write_run(tmp_path / "b", specimen=sim.gmc(4)))

@@ -17,7 +17,7 @@ from analysis_factory import write_run
 from magbend import sim
 from magbend.analysis import compare_run, fit_runs, load_run, write_report
 from magbend.analysis.compare.compare import RunComparison
-from magbend.analysis.fit.search import try_fit
+from magbend.analysis.fit.runs import try_fit
 from magbend.analysis.report.budget import ASSUMED, tip_budget
 from magbend.analysis.report.build import number
 from magbend.core.errors import StoreError

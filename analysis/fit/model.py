@@ -1,0 +1,178 @@
+"""What the unknowns of a fit mean: a rod in a field, as its photograph shows it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import sim
+from ...core.specimen import Specimen
+from ..compare.metrics import position_at
+from .nuisance import Owner
+from .problem import Datum, Problem, Shot
+
+Array = NDArray[np.float64]
+Values = dict[str, float]
+
+VIEW = ("frame_angle_deg", "scale_percent", "clamp_position_mm")
+"""What changes how a shape is seen, and not the shape."""
+
+PARTS = 4
+"""Pieces of a section whose stiffness changes gradually."""
+
+
+def values_of(problem: Problem, owner: Owner, unknowns: Array) -> Values:
+    """Return what the unknowns are for something of `owner`, in their own units."""
+    return {
+        name: problem.value(k, float(unknowns[k])) for k, name in problem.held_by(owner)
+    }
+
+
+def shape_of(problem: Problem, shot: Shot, values: Values) -> Array | None:
+    """Return the predicted points, shape (n, 2) in mm; None without an equilibrium."""
+    specimen = rod_of(shot.specimen, values)
+    support = _support_of(problem, values)
+    theory = "solid" if problem.model == "solid" else "rod"
+    field = _field_of(shot.field, values)
+    if problem.model == "uniform" and isinstance(field, sim.MagnetField):
+        field = sim.UniformField(
+            flux_mT=tip_flux_mT(field, shot.specimen.length_mm),
+            angle_deg=field.magnet.axis_angle_deg,
+        )
+    shape = sim.solve(
+        specimen, field, support=support, model=theory, points=241
+    ).centreline
+    if shape is None:
+        return None
+    # A measured line may be a little longer than the rod, never asked beyond its tip.
+    return np.column_stack(position_at(shape, shot.line.s_mm))
+
+
+def across_mm(shot: Shot, values: Values, xy_mm: Array) -> Array:
+    """Return measured minus predicted, across the measured line, shape (n,) in mm.
+
+    The measured frame leaves the clamp along the rod: the prediction is turned back by
+    the clamp's angle, then by the error of the frame, shifted across, and scaled.
+    """
+    turn = math.radians(
+        values.get("frame_angle_deg", 0.0) - values.get("clamp_angle_deg", 0.0)
+    )
+    c, s = math.cos(turn), math.sin(turn)
+    scale = 1.0 + values.get("scale_percent", 0.0) / 100.0
+    seen = scale * xy_mm @ np.array([[c, s], [-s, c]])
+    seen[:, 1] += values.get("clamp_position_mm", 0.0)
+    measured = np.column_stack([shot.line.x_mm, shot.line.y_mm])
+    return np.asarray(np.sum((measured - seen) * shot.normals, axis=1))
+
+
+def stated(datum: Datum, values: Values) -> float:
+    """Return what a run's number should be."""
+    scale = 1.0 + values.get("scale_percent", 0.0) / 100.0
+    if datum.kind == "length_mm":
+        return scale * (datum.specimen.length_mm + values.get("length_mm", 0.0))
+    if datum.kind == "width_mm":
+        side_mm = float(np.mean(datum.specimen.sides_mm))
+        return scale * side_mm * (1.0 + values.get("side_percent", 0.0) / 100.0)
+    field = _field_of(datum.field, values)
+    gain = 1.0 + values.get("meter_percent", 0.0) / 100.0
+    flux_mT = tip_flux_mT(field, datum.specimen.length_mm)
+    return gain * flux_mT + values.get("meter_offset_mT", 0.0)
+
+
+def tip_flux_mT(field: sim.MagnetField, length_mm: float) -> float:
+    """Return the flux density at the undeformed tip, where the meter reads it."""
+    tip = np.array([[length_mm, 0.0, 0.0]])
+    flux = sim.magnet_flux_mT(
+        field.magnet, tip, length_mm=length_mm, gap_mm=field.gap_mm
+    )
+    return float(np.linalg.norm(flux[0]))
+
+
+def rod_of(nominal: Specimen, values: Values) -> Specimen:
+    """Return the rod with all that the unknowns change of it."""
+    count = len(nominal.sections)
+    ends = np.cumsum([section.length_mm for section in nominal.sections])
+    middles = ends - 0.5 * np.diff(ends, prepend=0.0)
+    for i in range(count):
+        ends[i] += values.get(f"joint_mm[{i}]", 0.0)
+        ends[i:] += values.get(f"section_length_mm[{i}]", 0.0)
+    ends[-1] += values.get("length_mm", 0.0)
+    side = 1.0 + values.get("side_percent", 0.0) / 100.0
+    remanence = 1.0 + values.get("remanence_percent", 0.0) / 100.0
+    if "remanence_mT" in values:
+        remanence *= values["remanence_mT"] / nominal.remanence_mT
+    density = 1.0 + values.get("density_percent", 0.0) / 100.0
+    slope = values.get("remanence_profile_percent", 0.0) / 100.0
+    along = 2.0 * middles / nominal.length_mm - 1.0
+    sections = tuple(
+        replace(
+            nominal.sections[i],
+            length_mm=float(length),
+            E_MPa=values[f"E_MPa[{i}]"],
+            side_mm=nominal.sides_mm[i] * side,
+            remanence_mT=nominal.remanences_mT[i] * remanence * (1 + slope * along[i]),
+        )
+        for i, length in enumerate(np.diff(ends, prepend=0.0))
+    )
+    known = nominal.density_kg_m3
+    changed = replace(
+        nominal,
+        side_mm=nominal.side_mm * side,
+        sections=sections,
+        density_kg_m3=None if known is None else known * density,
+    )
+    share = values.get("stiffness_gradient", 0.0)
+    return _graded(changed, share) if share else changed
+
+
+def _graded(rod: Specimen, share: float) -> Specimen:
+    """Return the rod with a share of the way from steps to a smooth gradient of E."""
+    ends = np.array([0.0, *rod.joints_mm, rod.length_mm])
+    logs = np.log([section.E_MPa for section in rod.sections])
+    pieces = []
+    for i, section in enumerate(rod.sections):
+        edges = np.linspace(ends[i], ends[i + 1], PARTS + 1)
+        middles = 0.5 * (edges[1:] + edges[:-1])
+        smooth = np.interp(middles, 0.5 * (ends[1:] + ends[:-1]), logs)
+        for value in logs[i] + share * (smooth - logs[i]):
+            pieces.append(
+                replace(
+                    section, length_mm=section.length_mm / PARTS, E_MPa=math.exp(value)
+                )
+            )
+    return replace(rod, sections=tuple(pieces))
+
+
+def _field_of(
+    field: sim.UniformField | sim.MagnetField | None, values: Values
+) -> sim.UniformField | sim.MagnetField:
+    if isinstance(field, sim.MagnetField):
+        magnet = field.magnet
+        factor = 1.0 + values.get("magnet_percent", 0.0) / 100.0
+        if "magnet_remanence_T" in values:
+            factor *= values["magnet_remanence_T"] / magnet.remanence_T
+        x, y, z = magnet.offset_mm
+        return sim.MagnetField(
+            magnet=replace(
+                magnet,
+                remanence_T=magnet.remanence_T * factor,
+                offset_mm=(x + values.get("magnet_offset_mm", 0.0), y, z),
+            ),
+            gap_mm=field.gap_mm + values.get("gap_mm", 0.0),
+        )
+    # A uniform field is known by its reading alone.
+    true_mT = field.flux_mT - values.get("meter_offset_mT", 0.0)
+    true_mT /= 1.0 + values.get("meter_percent", 0.0) / 100.0
+    return replace(field, flux_mT=true_mT)
+
+
+def _support_of(problem: Problem, values: Values) -> sim.Support:
+    base = problem.support
+    return replace(
+        base,
+        clamp_angle_deg=base.clamp_angle_deg + values.get("clamp_angle_deg", 0.0),
+        load_factor=values.get("load_factor", base.load_factor),
+    )

@@ -1,0 +1,135 @@
+"""Whether a fit can be believed, and which single change would explain its misfit.
+
+The p-value is that of two tests together: the misfit as a whole against the errors that
+the lines show (an F test), and the best of all single changes (score tests). If the
+model is right it is even between 0 and 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from .models import ModelFit, better_models, compare_models
+from .result import FitResult
+from .search import Limits
+from .suspects import Suspect, refitted, scored
+
+Array = NDArray[np.float64]
+
+DOUBTFUL, CONTRADICTED = 0.05, 0.001
+"""p-values below which a fit is doubtful, and contradicted."""
+
+SERIOUS_FLAGS = (
+    "length_mismatch", "direction_doubtful", "joints_doubtful", "width_mismatch",
+)  # fmt: skip
+"""Doubts of a photograph's measurement that a fit shares."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict:
+    """Whether a fit can be believed.
+
+    Attributes
+    ----------
+    verdict : {"supported", "doubtful", "contradicted"}
+    p_value : float
+        How often a right model would look as bad.
+    reasons : tuple of str
+        Why it is not supported, a sentence each.
+    suspects : tuple of Suspect
+        Single changes that would explain the misfit, best first.
+    models : tuple of ModelFit
+        Theories of field and rod, each with its own moduli, best first.
+    flags : dict of str to int
+        Doubts of the measurement, and of how many photographs.
+    pulls : dict of str to float
+        How far each nuisance was pulled from its prior, in standard deviations.
+    """
+
+    verdict: str
+    p_value: float
+    reasons: tuple[str, ...]
+    suspects: tuple[Suspect, ...]
+    models: tuple[ModelFit, ...]
+    flags: dict[str, int]
+    pulls: dict[str, float]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the words of ``fit.json``."""
+        return {
+            "verdict": self.verdict,
+            "p_value": self.p_value,
+            "reasons": list(self.reasons),
+            "pulls": self.pulls,
+            "suspects": [suspect.as_dict() for suspect in self.suspects],
+            "models": [model.as_dict() for model in self.models],
+            "flags": self.flags,
+        }
+
+
+def judge(result: FitResult, limits: Limits) -> Verdict:
+    """Return the verdict on a fit."""
+    changes = scored(result)
+    whole = _p_of_misfit(result)
+    best = _p_of_best(result, [change.delta_chi2 for change in changes])
+    p_value = min(1.0, 2.0 * min(whole, best))
+    flags: dict[str, int] = {}
+    for shot in result.problem.shots:
+        for flag in shot.flags:
+            flags[flag] = flags.get(flag, 0) + 1
+    serious = {name: count for name, count in flags.items() if name in SERIOUS_FLAGS}
+    words = "supported"
+    if p_value < DOUBTFUL or serious or result.on_bounds:
+        words = "doubtful"
+    if p_value < CONTRADICTED:
+        words = "contradicted"
+    models = compare_models(result, limits)
+    suspects = [
+        *refitted(result, limits, changes, thorough=words != "supported"),
+        *better_models(result, models),
+    ]
+    return Verdict(
+        verdict=words,
+        p_value=p_value,
+        reasons=_reasons(result, p_value, serious),
+        suspects=tuple(sorted(suspects, key=lambda suspect: -suspect.delta_chi2)),
+        models=models,
+        flags=flags,
+        pulls={row["of"]: row["pull"] for row in result.nuisance},
+    )
+
+
+def _p_of_misfit(result: FitResult) -> float:
+    linear = result.linear
+    return float(stats.f.sf(result.chi2_reduced, linear.freedom, linear.noise_freedom))
+
+
+def _p_of_best(result: FitResult, gains: list[float]) -> float:
+    """p-value of the largest of several gains (Sidak), each of one freedom."""
+    if not gains:
+        return 1.0
+    one = float(stats.f.sf(max(gains), 1.0, result.linear.noise_freedom))
+    return float(-np.expm1(len(gains) * np.log1p(-min(one, 1.0 - 1e-12))))
+
+
+def _reasons(
+    result: FitResult, p_value: float, serious: dict[str, int]
+) -> tuple[str, ...]:
+    reasons = list(result.on_bounds)
+    if p_value < DOUBTFUL:
+        reasons.append(
+            f"a right model would look as bad in {100.0 * p_value:.2g} % of all runs: "
+            f"{result.rms_um:.2g} um RMS are left along the lines, whose own errors "
+            f"are about {np.median(result.noise_um):.2g} um"
+        )
+    shots = len(result.problem.shots)
+    reasons += [
+        f"{count} of {shots} photographs are flagged {name}"
+        for name, count in serious.items()
+    ]
+    return tuple(reasons)
