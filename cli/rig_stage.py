@@ -212,6 +212,9 @@ def twin(
     state: Annotated[
         Path | None, typer.Option("--state", help="Keep settings and position here.")
     ] = None,
+    board: Annotated[
+        str, typer.Option(help="Which it plays: grbl, grblhal, fluidnc or marlin.")
+    ] = "grbl",
 ) -> None:
     """Offer a virtual board on a pseudo-terminal.
 
@@ -223,14 +226,14 @@ def twin(
     from ..rig.virtual.board.file import load_board, save_board
     from ..rig.virtual.pty_server import PtyBoard
 
-    board = load_board(state)
-    with PtyBoard(board, SystemClock()) as served:
+    played = load_board(state, board)
+    with PtyBoard(played, SystemClock()) as served:
         typer.echo(served.port)
         with contextlib.suppress(KeyboardInterrupt), terminating():
             while True:
                 time.sleep(3600.0)
     if state is not None:
-        save_board(board, state)
+        save_board(played, state)
 
 
 @contextlib.contextmanager
@@ -279,10 +282,10 @@ def _told_how_to_go_on(stage: GapStage) -> Iterator[None]:
             with received.striking():
                 yield
         except (KeyboardInterrupt, StoppedError) as stop:
-            kept = stage.position_state == "homed"
-            what = "the position was kept" if kept else "home it (magbend rig home)"
-            how = f"stopped by {received.name}" if received.name else str(stop)
-            raise RigError(f"{how}; {what}") from None
+            proof = stage.last_stop
+            if not received.name or proof is None:
+                raise RigError(str(stop) or "stopped; home it") from None
+            raise RigError(f"stopped by {received.name}: {proof.sentence()}") from None
 
 
 def _facts(stage: GapStage) -> dict[str, Any]:

@@ -37,6 +37,7 @@ from .control.state import BenchState as BenchState
 from .errors import AlarmError as AlarmError
 from .errors import InterlockError as InterlockError
 from .errors import LinkLostError as LinkLostError
+from .errors import NotStoppedError as NotStoppedError
 from .errors import PositionLostError as PositionLostError
 from .errors import StageTimeoutError as StageTimeoutError
 from .errors import StoppedError as StoppedError

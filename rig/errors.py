@@ -48,3 +48,7 @@ class InterlockError(StageError):
 
 class StoppedError(StageError):
     """A stop was asked for (``magbend rig stop``) while the stage moved."""
+
+
+class NotStoppedError(StageError):
+    """No means could be proved to have stopped the stage: cut its power."""

@@ -1,4 +1,4 @@
-"""The table ``[[twin.fault]]`` of the rig file: what goes wrong, and when."""
+"""The table ``[twin]`` of the rig file: which board it plays, what goes wrong, when."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ...core.toml import FileModel
 
 FaultKind = Literal[
     "alarm 1", "alarm 2", "alarm 3", "alarm 8", "alarm 9", "restart", "unplug",
-    "silence", "deafness", "stall", "garbage", "torn line", "hold button",
+    "silence", "deafness", "no stop", "stall", "garbage", "torn line", "hold button",
     "camera stall", "camera dark", "meter overload", "meter silence",
 ]  # fmt: skip
 
@@ -41,4 +41,5 @@ class FaultConfig(FileModel):
 class TwinConfig(FileModel):
     """The table ``[twin]`` of the rig file: read by the computed bench alone."""
 
+    board: Literal["grbl", "grblhal", "fluidnc", "marlin"] = "grbl"
     fault: list[FaultConfig] = Field(default_factory=list)

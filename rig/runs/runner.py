@@ -298,6 +298,8 @@ class _Session:
         stage = self.devices.stage
         if status != "success" or stage.stop_requested():
             self._halt()
+            if status == "abort" and stage.last_stop is not None:
+                reason = f"{reason}: {stage.last_stop.sentence()}"
         try:
             self.folder.finish(status, reason)
         except MagbendError as error:

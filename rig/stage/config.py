@@ -38,6 +38,7 @@ class StageConfig(FileModel):
     piece_mm: PositiveNumber = 10.0
     homing: Literal["switches", "manual"] = "switches"
     home_command: str = "$H"
+    homed_at_mm: float | None = None
     home_timeout_s: PositiveNumber | None = None
     busy_factor: Annotated[float, Field(ge=1.0)] = 4.0
     answer_timeout_s: PositiveNumber = 3.0

@@ -26,6 +26,7 @@ from .protocol import (
     StageLimits,
     StageState,
 )
+from .stopping import StopProof
 
 logger = logging.getLogger(__name__)
 
@@ -296,15 +297,20 @@ class GapStage:
         """Ask the thread that moves the stage to hold; safe from any thread."""
         self._stage.request_stop()
 
-    def hold(self) -> None:
-        """Slow down, stand, forget the rest of the move; the position stays good."""
+    def hold(self) -> StopProof:
+        """Slow down, stand, forget the rest of the move; return what that took."""
         self._from_far_side = False
-        self._stage.hold()
+        return self._stage.hold()
 
-    def stop(self) -> None:
+    def stop(self) -> StopProof:
         """Stop at once; what moved is ``unverified`` afterwards."""
         self._from_far_side = False
-        self._stage.stop()
+        return self._stage.stop()
+
+    @property
+    def last_stop(self) -> StopProof | None:
+        """What the last stop has shown; None before the first."""
+        return self._stage.last_stop
 
     def abort(self, policy: AbortPolicy = "hold") -> None:
         """Hold; with the policy ``retract`` also go away from the magnet.

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 from ...core.errors import StageError
+from .stopping import StopProof
 
 PositionState = Literal["unknown", "homed", "unverified"]
 """How far the position can be trusted.
@@ -175,11 +176,16 @@ class Stage(Protocol):
         """Ask the thread that moves the stage to hold; safe from any thread."""
         ...
 
-    def hold(self) -> None:
-        """Slow down, stand, forget the rest of the move; the position stays good."""
+    @property
+    def last_stop(self) -> StopProof | None:
+        """What the last stop has shown."""
         ...
 
-    def stop(self) -> None:
+    def hold(self) -> StopProof:
+        """Slow down, stand, forget the rest of the move; say what that took."""
+        ...
+
+    def stop(self) -> StopProof:
         """Stop at once; the position is ``unverified`` if anything was moving."""
         ...
 

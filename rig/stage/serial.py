@@ -22,12 +22,19 @@ from ..ports import resolve_port
 from .config import StageConfig
 from .presence import Presence
 from .protocol import Moved, PositionState, StageIdentity, StageLimits, unheard
+from .stopping import StopProof
 from .trust import Counting, PositionTrust
 
 logger = logging.getLogger(__name__)
 
 MARGIN_S = 5.0
-STOPPED = "the stage was stopped by magbend rig stop, a key or Ctrl-C"
+
+
+def stopped(proof: StopProof) -> str:
+    """Return the sentence of a stop that somebody asked for."""
+    asked = "the stage was stopped by magbend rig stop, a key or Ctrl-C"
+    return f"{asked}: {proof.sentence()}"
+
 
 Session = TypeVar("Session", bound=Counting)
 
@@ -58,6 +65,8 @@ class SerialStage(ABC, Generic[Session]):
         self._limits: StageLimits | None = None
         self._trust = PositionTrust()
         self._is_stop_asked = False  # no Event: its lock may be held under a signal
+        self._is_under_way = False
+        self.last_stop: StopProof | None = None
 
     @property
     def position_state(self) -> PositionState:
@@ -113,12 +122,12 @@ class SerialStage(ABC, Generic[Session]):
         """Take in what the board says unasked; raise if it lost its position."""
 
     @abstractmethod
-    def hold(self) -> None:
-        """Bring to a stand what moves, and forget the rest; the position stays good."""
+    def hold(self) -> StopProof:
+        """Bring to a stand what moves, prove it, and forget the rest."""
 
     @abstractmethod
-    def stop(self) -> None:
-        """Stop at once; what was moving has lost steps."""
+    def stop(self) -> StopProof:
+        """Stop at once, and prove it; what was moving has lost steps."""
 
     @abstractmethod
     def _cry_stop(self) -> None:
@@ -186,8 +195,7 @@ class SerialStage(ABC, Generic[Session]):
 
     def _hold_if_asked(self) -> None:
         if self.stop_requested():
-            self.hold()
-            raise StoppedError(STOPPED)
+            raise StoppedError(stopped(self.hold()))
 
     @contextlib.contextmanager
     def _stand_if_interrupted(self, *, at_once: bool = False) -> Iterator[None]:
@@ -260,11 +268,15 @@ class SerialStage(ABC, Generic[Session]):
         if abs(distance) <= self.limits.step_mm / 2.0:
             return
         pieces = math.ceil(abs(distance) / self._longest_piece_mm(feed_mm_min))
-        with self._stand_if_interrupted():
-            for piece in range(1, pieces + 1):
-                self._hold_if_asked()
-                target = here + distance * piece / pieces
-                self._move_piece(target, feed_mm_min, moved)
+        self._is_under_way = True
+        try:
+            with self._stand_if_interrupted():
+                for piece in range(1, pieces + 1):
+                    self._hold_if_asked()
+                    target = here + distance * piece / pieces
+                    self._move_piece(target, feed_mm_min, moved)
+        finally:
+            self._is_under_way = False
 
     def _longest_piece_mm(self, feed_mm_min: float) -> float:
         """Return how far one motion may go, in mm."""

@@ -19,9 +19,10 @@ from ..errors import StageTimeoutError
 from ..link import Link
 from ..ports import resolve_port
 from .config import StageConfig
-from .grbl.motion import await_stand, stands
-from .grbl.protocol import FEED_HOLD
+from .grbl.motion import stands
 from .grbl.session import GrblSession
+from .grbl.stopping import stop_motion
+from .stopping import StopProof
 
 _STOP_S = 15.0
 _POLL_S = 0.02
@@ -36,6 +37,11 @@ class Stoppable(Protocol):
 
     def stop_requested(self) -> bool:
         """Return whether a stop is asked for and not met."""
+        ...
+
+    @property
+    def last_stop(self) -> StopProof | None:
+        """What the last stop has shown."""
         ...
 
 
@@ -56,7 +62,9 @@ def stopping(stage: Stoppable) -> Callable[[], str]:
                     f"just now; the request stays until its next move"
                 )
             time.sleep(_POLL_S)
-        return f"process {os.getpid()} was told and has stopped the stage"
+        proof = stage.last_stop
+        how = f": {proof.sentence()}" if proof else ""
+        return f"process {os.getpid()} was told and has stopped the stage{how}"
 
     return stop
 
@@ -94,13 +102,9 @@ def _hold_directly(config: StageConfig, port: str, clock: Clock) -> str:
         before = session.ask(config.answer_timeout_s)
         if before is not None and stands(before):
             return f"the stage already stands ({before.state}); nothing was sent"
-        session.realtime(FEED_HOLD)
-        report = await_stand(session, clock, _STOP_S)
-        if report is None:
+        proof = stop_motion(session, clock, axis="XYZ".index(config.axis))
+        if session.report is not None and session.report.state == "hold":
             session.reset()
-            return "the stage did not answer a feed hold and was reset; home it"
-        if report.state == "hold":
-            session.reset()
-        return "the stage was moving and has been stopped; its position is kept"
+        return f"the stage was moving and has been stopped: {proof.sentence()}"
     finally:
         link.close()

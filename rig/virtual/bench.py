@@ -11,8 +11,9 @@ from ..bench.devices import Devices
 from ..clock import Clock, SteppedClock
 from ..link import WireLog
 from ..stage.gap import GapStage
-from ..stage.grbl.stage import GrblStage
-from .board.firmware import GrblBoard
+from ..stage.make import make_stage
+from .board.file import Board, make_board
+from .board.marlin import MarlinBoard
 from .board.plant import Plant
 from .camera import Render, VirtualCamera
 from .faults import TwinParts, schedule_faults
@@ -23,10 +24,15 @@ from .protocol_twin import register_board
 _BOARD_SETTINGS = {1: 255, 10: 3, 20: 1, 21: 1, 22: 1, 130: 180, 120: 50}
 
 
-def twin_board(*, backlash_mm: float = 0.0) -> GrblBoard:
+def twin_board(*, backlash_mm: float = 0.0, kind: str = "grbl") -> Board:
     """Return a board with homing switches whose machine zero is the switch."""
+    if kind == "marlin":
+        low = Plant(
+            start_mm=(-20.0,) * 3, switch_low_mm=-180.0, backlash_mm=backlash_mm
+        )
+        return make_board(kind, low)
     plant = Plant(switch_high_mm=0.0, backlash_mm=backlash_mm)
-    return GrblBoard(plant, dict(_BOARD_SETTINGS))
+    return make_board(kind, plant, dict(_BOARD_SETTINGS))
 
 
 def open_twin(
@@ -36,7 +42,7 @@ def open_twin(
     *,
     seed: int = 0,
     clock: Clock | None = None,
-    board: GrblBoard | None = None,
+    board: Board | None = None,
     log: WireLog | None = None,
     camera: Mapping[str, Any] | None = None,
     meter: Mapping[str, Any] | None = None,
@@ -72,10 +78,11 @@ def open_twin(
         Close them when done.
     """
     clock = clock or SteppedClock()
-    board = board or twin_board()
+    board = board or twin_board(kind=rig.twin.board)
     url = register_board(f"bench-{id(board):x}", board, clock)
-    config = rig.stage.model_copy(update={"driver": "grbl", "port": url})
-    stage = GapStage(GrblStage(config, clock, log=log), config, rig.limits, clock)
+    driver = "marlin" if isinstance(board, MarlinBoard) else "grbl"
+    config = rig.stage.model_copy(update={"driver": driver, "port": url})
+    stage = GapStage(make_stage(config, clock, log=log), config, rig.limits, clock)
     axis = "XYZ".index(config.axis)
 
     def gap_mm() -> float:

@@ -111,6 +111,7 @@ def _on_board(fault: FaultConfig, board: GrblBoard) -> Strike:
         "unplug": lambda: switch(board, "plugged", during=False),
         "silence": lambda: board.lose_output(for_s),
         "deafness": lambda: board.lose_input(for_s),
+        "no stop": lambda: switch(board, "heeds_stops", during=False),
         "stall": lambda: switch(board.mover, "stalled", during=True),
         "garbage": lambda: board.send(b"\xff\x00~{\r\n"),
         "torn line": lambda: board.send(b"<Run|MP"),

@@ -2,7 +2,8 @@
 
 ``twin://NAME`` is a board that a program has registered with `register_board`.
 ``twin://PATH.json`` (or ``twin://`` with no name) is a board of its own: a path keeps
-settings and position between programs, as a powered board would.
+settings and position between programs, as a powered board would. ``?board=`` says which
+firmware it plays (grbl, grblhal, fluidnc, marlin), ``?speed=`` how fast its time runs.
 """
 
 from __future__ import annotations
@@ -16,21 +17,20 @@ from serial import PortNotOpenError, SerialBase, SerialException
 
 from ...core.errors import StageError
 from ..clock import Clock, ScaledClock, SystemClock
-from .board.file import load_board, save_board
-from .board.firmware import GrblBoard
+from .board.file import Board, load_board, save_board
 
 _SLICE_S = 0.005
-_BOARDS: dict[str, tuple[GrblBoard, Clock]] = {}
+_BOARDS: dict[str, tuple[Board, Clock]] = {}
 
 
-def register_board(name: str, board: GrblBoard, clock: Clock) -> str:
+def register_board(name: str, board: Board, clock: Clock) -> str:
     """Give a board a name; return the URL of its port.
 
     Parameters
     ----------
     name : str
         Letters, digits, dots and dashes.
-    board : GrblBoard
+    board : Board
         The board.
     clock : Clock
         The clock that moves it: hand the same one to the driver.
@@ -48,7 +48,7 @@ class Serial(SerialBase):
     """The port of a virtual board, as pyserial shows a port."""
 
     def __init__(self, *args: Any, **options: Any) -> None:
-        self._board: GrblBoard | None = None
+        self._board: Board | None = None
         self._clock: Clock = SystemClock()
         self._start_s = 0.0
         self._pending = bytearray()
@@ -121,7 +121,7 @@ class Serial(SerialBase):
     def reset_output_buffer(self) -> None:
         """Nothing waits on this side."""
 
-    def _catch_up(self) -> GrblBoard:
+    def _catch_up(self) -> Board:
         if not self.is_open or self._board is None:
             raise PortNotOpenError
         now_s = self._clock.monotonic_s() - self._start_s
@@ -134,14 +134,14 @@ class Serial(SerialBase):
         self._pending += self._board.read()
         return self._board
 
-    def _own_board(self, name: str, query: dict[str, list[str]]) -> GrblBoard:
+    def _own_board(self, name: str, query: dict[str, list[str]]) -> Board:
         speed = float(query.get("speed", ["1"])[0])
         self._clock = SystemClock() if speed == 1.0 else ScaledClock(speed)
         if name and not name.endswith(".json"):
             raise SerialException(f"there is no virtual board named {name}")
         self._state_file = Path(name) if name else None
         try:
-            return load_board(self._state_file)
+            return load_board(self._state_file, query.get("board", ["grbl"])[0])
         except StageError as error:
             raise SerialException(str(error)) from None
 

@@ -9,7 +9,7 @@ import threading
 
 from ...core.errors import StageError
 from ..clock import Clock
-from .board.firmware import GrblBoard
+from .board.file import Board
 
 _SLICE_S = 0.005
 
@@ -28,7 +28,7 @@ class PtyBoard:
         If the system has no pseudo-terminals.
     """
 
-    def __init__(self, board: GrblBoard, clock: Clock) -> None:
+    def __init__(self, board: Board, clock: Clock) -> None:
         if not hasattr(os, "openpty"):
             raise StageError("this system has no pseudo-terminals; use twin:// instead")
         import tty

@@ -15,6 +15,7 @@ from magbend.rig.bench.devices import Devices
 from magbend.rig.clock import SteppedClock
 from magbend.rig.stage.gap import GapStage
 from magbend.rig.stage.protocol import StageIdentity, StageLimits, StageStatus
+from magbend.rig.stage.stopping import StopProof
 from magbend.rig.virtual.camera import VirtualCamera
 from magbend.rig.virtual.meter import VirtualMeter
 
@@ -124,11 +125,17 @@ class FakeStage:
     def request_stop(self) -> None:
         self.is_stop_asked = True
 
-    def hold(self) -> None:
-        self._log("hold")
+    @property
+    def last_stop(self) -> StopProof:
+        return StopProof(means="nothing")
 
-    def stop(self) -> None:
+    def hold(self) -> StopProof:
+        self._log("hold")
+        return self.last_stop
+
+    def stop(self) -> StopProof:
         self._log("stop")
+        return self.last_stop
 
     def recover(self) -> None:
         self._log("recover")

@@ -30,6 +30,9 @@ class InterruptingClock(SteppedClock):
     def at(self, time_s: float, action: Callable[[], None]) -> None:
         self._due.append((time_s, action))
 
+    def forget(self) -> None:
+        self._due.clear()
+
     def sleep(self, duration_s: float) -> None:
         super().sleep(duration_s)
         for item in [i for i in self._due if i[0] <= self.monotonic_s()]:

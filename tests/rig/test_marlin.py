@@ -231,7 +231,7 @@ def test_ctrl_c_while_homing_stops_and_the_next_answers_are_not_off_by_one(
     clock.at(clock.monotonic_s() + after_s, interrupt)
     with pytest.raises(KeyboardInterrupt):
         stage.home()
-    assert board.seen[-1] == "M410"
+    assert "M410" in board.seen
     assert stage.position_state == "unknown"
     clock.sleep(10.0)  # without its emergency parser the board homes to the end
     stage.home()

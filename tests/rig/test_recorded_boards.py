@@ -200,11 +200,11 @@ def test_a_stop_slows_the_jog_down_and_keeps_the_position(seed: int) -> None:
         stage.request_stop()
 
     board.on(r"\$J=.*", long_jog)
-    board.on("!", held)
-    with pytest.raises(StoppedError):
+    board.on("\x85", held)
+    with pytest.raises(StoppedError, match="the position was kept"):
         stage.move_to(-35.0, feed_mm_min=300.0)
     assert stage.position_state == "homed"
-    assert "\x18" not in board.heard[board.heard.index("!") :]
+    assert "\x18" not in board.heard[board.heard.index("\x85") :]
     stage.close()
 
 

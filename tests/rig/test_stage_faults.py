@@ -60,7 +60,7 @@ MOVE_FAULTS: dict[str, tuple[Fault, type[BaseException], str]] = {
         _later(lambda b: b.board.power_cycle(boot_s=1.8)), PositionLostError,
         "unknown"),
     "cable pulled": (_later(_unplug), LinkLostError, "unverified"),
-    "motor stalled": (_later(_stall), StageTimeoutError, "unverified"),
+    "motor stalled": (_later(_stall), StageTimeoutError, "unknown"),
     "board silent": (
         _later(lambda b: b.board.lose_output(60.0)), StageTimeoutError, "unverified"),
     "hold button pressed": (_later(_hold_button), StageTimeoutError, "unverified"),

@@ -154,6 +154,7 @@ def limits_of(
     downward = int(number(settings, "23") or 0) >> index & 1
     origin_zero = "Z" in _options(details) or _homing_bits(settings) & 8
     homed = 0.0 if origin_zero else pull_off - travel if downward else -pull_off
+    homed = homed if config.homed_at_mm is None else config.homed_at_mm
     away = travel - pull_off
     switch, far = (-pull_off, away) if downward else (pull_off, -away)
     by_switches = config.homing == "switches"

@@ -9,8 +9,9 @@ from ....core.errors import StageError
 from ...clock import Clock
 from ...errors import StageTimeoutError
 from ..config import StageConfig
-from .protocol import FEED_HOLD, Message, Report, Setting
+from .protocol import Message, Report, Setting
 from .session import CommandRefusedError, GrblSession
+from .stopping import stop_motion
 
 _RESET_TRIES = 3
 _MOVING_STATES = ("run", "jog")
@@ -53,7 +54,9 @@ def connect_board(
     undisturbed = session.restarts == 0 and report is not None
     undisturbed = undisturbed and report is not None and report.state == "idle"
     if report is not None and _moving(report):
-        report = _wait_for_stand(session, clock, config)
+        axis = "XYZ".index(config.axis)
+        stop_motion(session, clock, axis=axis)  # an earlier program left it moving
+        report = session.report
     if config.reset_on_connect or report is None or report.state != "idle":
         _reset(session, config)
     _refuse_open_door(session)
@@ -102,21 +105,6 @@ def _moving(report: Report) -> bool:
     return report.state in _MOVING_STATES or (
         report.state == "hold" and report.substate != 0
     )
-
-
-def _wait_for_stand(
-    session: GrblSession, clock: Clock, config: StageConfig
-) -> Report | None:
-    """Bring to a stand what an earlier program left moving."""
-    session.realtime(FEED_HOLD)
-    deadline_s = clock.monotonic_s() + 5.0 * config.busy_factor
-    report = session.report
-    while clock.monotonic_s() < deadline_s:
-        report = session.ask()
-        if report is None or not _moving(report):
-            return report
-        clock.sleep(0.1)
-    return report
 
 
 def _refuse_open_door(session: GrblSession) -> None:

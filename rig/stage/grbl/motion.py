@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from ...clock import Clock
 from ...errors import StageTimeoutError
 from ..protocol import Moved
-from .protocol import Alarm, Ok, Refusal, Report, Triple
+from .protocol import Alarm, Ok, Refusal, Report
 from .session import CommandRefusedError, GrblSession
 
 POLL_S = 0.1
@@ -120,29 +120,6 @@ def _raise_if_amiss(
         )
     if report.state in ("door", "sleep", "check"):
         raise StageTimeoutError(f"the board went to the state {report.state}")
-
-
-def await_stand(session: GrblSession, clock: Clock, limit_s: float) -> Report | None:
-    """Return the report of a board that stands, or None if it does not say so.
-
-    It must say so twice: the first answer may be a late one, from before.
-    """
-    deadline_s = clock.monotonic_s() + limit_s
-    before: Report | None = None
-    while clock.monotonic_s() < deadline_s:
-        report = session.ask()
-        if session.deaf:
-            return None
-        if report and stands(report):
-            if before and _place(before) == _place(report):
-                return report
-            before = report
-        clock.sleep(POLL_S)
-    return None
-
-
-def _place(report: Report) -> Triple | None:
-    return report.machine or report.work
 
 
 def await_homing(

@@ -21,11 +21,12 @@ from ...errors import (
 )
 from ...link import Link
 from ..protocol import Moved, StageIdentity, StageStatus
-from ..serial import MARGIN_S, STOPPED, SerialStage
+from ..serial import SerialStage, stopped
+from ..stopping import StopProof
 from . import audit as grbl_audit
 from .connect import FoundBoard, connect_board
-from .motion import Target, await_arrival, await_homing, await_stand, stands
-from .protocol import FEED_HOLD, SOFT_RESET, Report, alarm_text, jog_line
+from .motion import Target, await_arrival, await_homing, stands
+from .protocol import SOFT_RESET, Report, alarm_text, jog_line
 from .ready import (
     make_ready,
     note,
@@ -35,12 +36,14 @@ from .ready import (
     wait_for_report,
 )
 from .session import CommandRefusedError, GrblSession
+from .stopping import reset_motion, stop_motion
 
 
 class GrblStage(SerialStage[GrblSession]):
     """One axis of a GRBL board; made as `SerialStage` is."""
 
     _undisturbed = False
+    _feed_mm_min: float | None = None  # of the motion that was sent last
 
     def _meet(self, link: Link) -> GrblSession:
         config = self._config
@@ -111,8 +114,7 @@ class GrblStage(SerialStage[GrblSession]):
 
     def _stop_homing_if_asked(self) -> None:
         if self.stop_requested():
-            self.stop()
-            raise StoppedError(STOPPED)
+            raise StoppedError(stopped(self.stop()))
 
     def _standing_mm(self) -> float:
         report = self._wait_for_report(self._require_session())
@@ -174,47 +176,59 @@ class GrblStage(SerialStage[GrblSession]):
             raise session.alarm_error(session.alarm)
         session.raise_if_restarted(restarts)
 
-    def hold(self) -> None:
-        """Feed hold, wait for standstill, forget the rest; the position stays good.
+    def hold(self) -> StopProof:
+        """Stop and prove it (see `stopping`); forget the rest of the move.
 
         Raises
         ------
         StageTimeoutError
-            If the board does not say that it stands; it is reset, and the position is
-            ``unverified``.
+            If the stage moves even after a reset, or does not answer.
         """
         session = self._require_session()
-        session.realtime(FEED_HOLD)
         try:
-            self._await_hold(session)
+            proof = stop_motion(
+                session,
+                self._clock,
+                axis=self._axis,
+                limits=self._limits,
+                feed_mm_min=self._feed_mm_min,
+            )
+            state = session.report.state if session.report else ""
+            if state == "hold" or not session.in_step:
+                reset_standing(session, self._trust)
+            return self._take_stop(session, proof)
+        except StageError:
+            self._trust.doubt()
+            raise
         finally:
             self._stop_is_met()
 
-    def _await_hold(self, session: GrblSession) -> None:
-        speed_mm_s = self.limits.max_feed_mm_min / 60.0
-        stopping_s = speed_mm_s / self.limits.acceleration_mm_s2
-        limit_s = MARGIN_S + self._config.busy_factor * stopping_s
-        report = await_stand(session, self._clock, limit_s)
-        if report is not None:
-            if report.state == "hold" or not session.in_step:
-                reset_standing(session, self._trust)
-            self._trust.stands(session)
-            return
-        self._trust.doubt()
-        note(session, self._trust)
-        session.reset()
-        raise StageTimeoutError(
-            "the stage did not come to a stop that it could report; it was reset; "
-            "home it (magbend rig home)"
-        )
+    def stop(self) -> StopProof:
+        """Soft-reset at once, and prove it; what was moving has lost steps.
 
-    def stop(self) -> None:
-        """Soft-reset at once; what was moving has lost steps."""
+        Raises
+        ------
+        StageTimeoutError
+            If the stage moves all the same, or does not answer.
+        """
         session = self._require_session()
         if session.report is None or not stands(session.report):
             self._trust.doubt()
-        self._stop_is_met()
-        reset_standing(session, self._trust)
+        try:
+            proof = reset_motion(session, self._clock, axis=self._axis)
+            return self._take_stop(session, proof)
+        finally:
+            self._stop_is_met()
+
+    def _take_stop(self, session: GrblSession, proof: StopProof) -> StopProof:
+        """Keep the proof, and take in what it says of the place."""
+        self.last_stop = proof
+        note(session, self._trust)
+        if proof.is_place_kept:
+            self._trust.stands(session)
+        else:
+            self._trust.doubt()
+        return proof
 
     def _cry_stop(self) -> None:
         self._require_session().realtime(SOFT_RESET)
@@ -280,6 +294,7 @@ class GrblStage(SerialStage[GrblSession]):
         session = self._require_session()
         target = self._target(target_mm, feed_mm_min)
         restarts = session.restarts
+        self._feed_mm_min = feed_mm_min
         try:
             session.command(jog_line(self._config.axis, target_mm, feed_mm_min))
             await_arrival(
@@ -325,14 +340,18 @@ class GrblStage(SerialStage[GrblSession]):
 
     def _give_up(self, session: GrblSession, error: StageTimeoutError) -> NoReturn:
         """Bring the stage to a stand after a timeout, and say so."""
-        with contextlib.suppress(StageError):
-            self.hold()
+        self._trust.doubt()
+        try:
+            how = self.hold().sentence().partition(";")[0]
+        except StageError as failure:
+            how = str(failure)
         self._trust.doubt()
         if not session.in_step:
             with contextlib.suppress(StageError):
                 session.reset()
         raise StageTimeoutError(
-            f"{error}; the stage was stopped and its position is unverified: home it"
+            f"{error}; the stage was stopped ({how}) and its position is unverified: "
+            "home it"
         ) from None
 
     def _make_ready(self, session: GrblSession) -> None:

@@ -9,17 +9,26 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Sequence
+from typing import NoReturn
 
 from ....core.errors import StageError
-from ...errors import LinkLostError, PositionLostError, StageTimeoutError, StoppedError
+from ...errors import (
+    LinkLostError,
+    NotStoppedError,
+    PositionLostError,
+    StageTimeoutError,
+    StoppedError,
+)
 from ...link import Link
 from ..config import StageConfig
 from ..protocol import Moved, StageIdentity, StageLimits, StageStatus
-from ..serial import MARGIN_S, SerialStage
+from ..serial import MARGIN_S, SerialStage, stopped
+from ..stopping import StopProof
 from .session import LineRefusedError, MarlinSession, MarlinSetup, read_setup
 
 _HOME_S = 120.0
 _PIECE_S = 0.75
+_STILL_S = 0.1
 
 
 class MarlinStage(SerialStage[MarlinSession]):
@@ -71,9 +80,7 @@ class MarlinStage(SerialStage[MarlinSession]):
 
     def _stop_homing_if_asked(self) -> None:
         if self.stop_requested():
-            self._cry_stop()
-            self._stop_is_met()
-            raise StoppedError("homing was stopped by magbend rig stop; home it again")
+            raise StoppedError(stopped(self.stop()))
 
     def _standing_mm(self) -> float:
         return self._known_mm()
@@ -121,29 +128,67 @@ class MarlinStage(SerialStage[MarlinSession]):
                 "the board restarted or was halted; home it (magbend rig home)"
             )
 
-    def hold(self) -> None:
+    def hold(self) -> StopProof:
         """Let the short piece that runs come to its end; the position stays good.
 
         Raises
         ------
         StageTimeoutError
-            If it does not end; the board is stopped, and the position ``unverified``.
+            If it cannot be proved to stand, even after ``M410``.
         """
-        session = self._require_session()
-        self._stop_is_met()
-        with contextlib.suppress(StageTimeoutError):
+        session, start_s = self._require_session(), self._clock.monotonic_s()
+        from_mm, idle = session.place_mm, not self._is_under_way
+        try:
             session.command("M400", timeout_s=self._piece_s)
-            self._machine_mm()
-            self._trust.stands(session)
-            return
-        self.stop()
-        raise StageTimeoutError("the stage did not come to a stop; home it")
-
-    def stop(self) -> None:
-        """``M410``: stop at once, steps are lost."""
-        self._trust.doubt()
+            here = self._machine_mm()
+        except StageTimeoutError as error:
+            return self._stop_hard(f"end of the piece: {error}")
+        self._trust.stands(session)
+        run_out = None if here is None or from_mm is None else abs(here - from_mm)
+        self.last_stop = StopProof(
+            means="nothing" if idle else "end of the piece",
+            stood_s=self._clock.monotonic_s() - start_s,
+            machine_mm=here,
+            run_out_mm=run_out,
+        )
         self._stop_is_met()
+        return self.last_stop
+
+    def stop(self) -> StopProof:
+        """``M410``: stop at once, steps are lost.
+
+        Raises
+        ------
+        StageTimeoutError
+            If it cannot be proved to stand.
+        """
+        return self._stop_hard("")
+
+    def _stop_hard(self, lack: str) -> StopProof:
+        start_s = self._clock.monotonic_s()
+        self._trust.doubt()
         self._cry_stop()
+        try:
+            first = self._machine_mm()
+            self._clock.sleep(_STILL_S)
+            here = self._machine_mm()
+        except StageTimeoutError:
+            first = here = None
+        if here is None or here != first:
+            self._stop_is_met()
+            raise NotStoppedError(
+                "the stage could not be proved to stand, even after M410: cut the "
+                "power of its motors"
+            )
+        self.last_stop = StopProof(
+            means="reset",
+            tried=(lack,) if lack else (),
+            stood_s=self._clock.monotonic_s() - start_s,
+            machine_mm=here,
+            is_place_kept=False,
+        )
+        self._stop_is_met()
+        return self.last_stop
 
     def _cry_stop(self) -> None:
         self._require_session().interrupt("M410")
@@ -168,9 +213,11 @@ class MarlinStage(SerialStage[MarlinSession]):
         except PositionLostError:
             self._trust.lose()
             raise
-        except (StageTimeoutError, LinkLostError):
+        except LinkLostError:
             self._trust.doubt()
             raise
+        except StageTimeoutError as error:
+            self._give_up(error)
         if here is None or abs(here - target_mm) > 1.01 * self.limits.step_mm + 0.01:
             self._trust.doubt()
             raise StageTimeoutError(
@@ -178,6 +225,17 @@ class MarlinStage(SerialStage[MarlinSession]):
             )
         self._trust.stands(session)
         moved(target_mm)
+
+    def _give_up(self, error: StageTimeoutError) -> NoReturn:
+        """Stop what did not end in time, and say what that took."""
+        try:
+            how = self.stop().sentence().partition(";")[0]
+        except StageError as failure:
+            how = str(failure)
+        raise StageTimeoutError(
+            f"{error}; the stage was stopped ({how}) and its position is unverified: "
+            "home it"
+        ) from None
 
     def _longest_piece_mm(self, feed_mm_min: float) -> float:
         # A piece cannot be cut short: a stop must wait for its end.

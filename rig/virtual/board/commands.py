@@ -51,7 +51,7 @@ def _always(board: BoardState, body: str) -> Task:
     if body == "$":
         if board.state in ("Run", "Hold"):
             raise GcodeError(8)
-        for row in board.eeprom.lines():
+        for row in board.eeprom.lines(board.dialect):
             yield from board.print_line(row)
     elif body == "G":
         yield from board.print_line(f"[GC:{board.modal.text()}]")
@@ -83,8 +83,8 @@ def _standing(board: BoardState, body: str) -> Task:
     elif body == "SLP":
         board.flags.add("sleep")
     elif body == "I":
-        yield from board.print_line("[VER:1.1h.20190830:]")
-        yield from board.print_line("[OPT:V,15,128]")
+        for row in board.dialect.details:
+            yield from board.print_line(row)
     elif body[0] == "N":
         yield from _startup(board, body)
     elif body.startswith("RST="):
@@ -170,6 +170,7 @@ def _home_axes(board: BoardState, axes: tuple[int, ...]) -> Task:
     for axis in axes:
         reverse = int(board.eeprom[23]) >> axis & 1
         place = pull_off - board.eeprom[130 + axis] if reverse else -pull_off
+        place = board.dialect.homed_mm.get(axis, place)
         board.position[axis] = round(place * board.eeprom[100 + axis])
 
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 
 from .commands import system_line
+from .dialect import GRBL, Dialect
 from .gcode import GcodeError, Modal, read_line
 from .orders import auto_start, run_order, startup_lines
 from .plant import Plant
@@ -25,7 +26,6 @@ from .state import RX_BYTES, BoardState, Counters, Task
 _LINE_CHARS = 79
 _TICK_S = 0.005
 _PASS_S = 2e-5
-_BANNER = "\r\nGrbl 1.1h ['$' for help]"
 _OVERRIDES = {
     0x90: (0, 100), 0x91: (0, 10), 0x92: (0, -10), 0x93: (0, 1), 0x94: (0, -1),
 }  # fmt: skip
@@ -40,12 +40,23 @@ class GrblBoard(BoardState):
         The mechanics; by default those of the recording.
     settings : mapping of int to float, optional
         Settings that differ from the defaults of the generic build.
+    dialect : Dialect, optional
+        Which firmware it plays.
+
+    Attributes
+    ----------
+    heeds_stops : bool
+        Whether a jog cancel and a feed hold stop it: a fault takes that away.
     """
 
     def __init__(
-        self, plant: Plant | None = None, settings: dict[int, float] | None = None
+        self,
+        plant: Plant | None = None,
+        settings: dict[int, float] | None = None,
+        dialect: Dialect = GRBL,
     ) -> None:
-        super().__init__(plant, settings)
+        super().__init__(plant, settings, dialect)
+        self.heeds_stops = True
         self._power_up()
 
     # --- what the outside sees ------------------------------------------------
@@ -127,8 +138,10 @@ class GrblBoard(BoardState):
         if byte == 0x18:
             self.reset_from_anywhere()
         elif byte == 0x85:
-            if self.state == "Jog":
+            if self.state == "Jog" and self.heeds_stops:
                 self._flag("cancel")
+        elif byte == 0x21 and not self._heeds_hold():
+            return
         elif byte in b"?!~":
             self._flag({63: "status", 33: "hold", 126: "start"}[byte])
         elif byte in _OVERRIDES:
@@ -139,6 +152,9 @@ class GrblBoard(BoardState):
         elif byte < 0x80 and len(self._rx) < RX_BYTES:
             self._rx.append(byte)
             self._wake_s = min(self._wake_s, self.now_s)
+
+    def _heeds_hold(self) -> bool:
+        return self.heeds_stops and (self.dialect.holds_jogs or self.state != "Jog")
 
     # --- main loop ------------------------------------------------------------
 
@@ -156,7 +172,7 @@ class GrblBoard(BoardState):
             self.g92 = [0.0, 0.0, 0.0]
             self.mover.kill()
             self.planned = list(self.position)
-            yield from self.print_line(_BANNER)
+            yield from self.print_line("\r\n" + self.dialect.banner)
             yield from self._main_loop()
 
     def _main_loop(self) -> Task:

@@ -42,10 +42,12 @@ def set_offset(board: BoardState, order: Order) -> None:
 
 def outside(board: BoardState, target: list[float]) -> bool:
     """Return whether a target in mm lies beyond the travel."""
-    return any(
-        place > 0.0 or place < -board.eeprom[130 + axis]
-        for axis, place in enumerate(target)
-    )
+    for axis, place in enumerate(target):
+        travel = board.eeprom[130 + axis]
+        low, high = (0.0, travel) if board.dialect.counts_up else (-travel, 0.0)
+        if not low <= place <= high:
+            return True
+    return False
 
 
 def plan(board: BoardState, target: list[float], feed_mm_min: float) -> None:

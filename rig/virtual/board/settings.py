@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from .dialect import Dialect
+
 _INTEGERS = {0, 1, 2, 3, 4, 5, 6, 10, 13, 20, 21, 22, 23, 26, 30, 31, 32}
 DEFAULTS: Mapping[int, float] = {
     0: 10, 1: 25, 2: 0, 3: 0, 4: 0, 5: 0, 6: 0, 10: 1, 11: 0.01, 12: 0.002, 13: 0,
@@ -61,10 +63,11 @@ class Eeprom:
         """Go back to the defaults of the build."""
         self.values = dict(DEFAULTS)
 
-    def lines(self) -> list[str]:
-        """Return the rows of ``$$``."""
-        return [f"${n}={self._text(n)}" for n in sorted(self.values)]
+    def lines(self, dialect: Dialect) -> list[str]:
+        """Return the rows of ``$$``, as a firmware prints them."""
+        shown = sorted(self.values.keys() - dialect.hidden)
+        return [f"${n}={self._text(n, dialect.decimals)}" for n in shown]
 
-    def _text(self, number: int) -> str:
+    def _text(self, number: int, decimals: int) -> str:
         value = self.values[number]
-        return f"{value:.0f}" if number in _INTEGERS else f"{value:.3f}"
+        return f"{value:.0f}" if number in _INTEGERS else f"{value:.{decimals}f}"

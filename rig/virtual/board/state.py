@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Generator
 
+from .dialect import GRBL, Dialect
 from .gcode import Modal
 from .line import BoardLine
 from .mover import Mover
@@ -35,12 +36,18 @@ class BoardState(BoardLine):
         The mechanics; by default those of the recording.
     settings : mapping of int to float, optional
         Settings that differ from the defaults of the generic build.
+    dialect : Dialect, optional
+        Which firmware it plays.
     """
 
     def __init__(
-        self, plant: Plant | None = None, settings: dict[int, float] | None = None
+        self,
+        plant: Plant | None = None,
+        settings: dict[int, float] | None = None,
+        dialect: Dialect = GRBL,
     ) -> None:
         super().__init__()
+        self.dialect = dialect
         self.plant = plant or Plant()
         self.eeprom = Eeprom(settings)
         self.mover = Mover(self._on_step)
