@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import sys
 import time
 from collections.abc import Iterator
@@ -11,6 +10,7 @@ from typing import Any
 
 import typer
 
+from ..core.json import dump_json
 from ..core.progress import Progress
 
 JSON = typer.Option(False, "--json", help="Print JSON for a machine.")
@@ -31,23 +31,7 @@ def group(name: str, help_text: str, example: str) -> typer.Typer:
 
 def print_json(data: Any, *, indent: int | None = 2) -> None:
     """Print `data` as JSON; NaN becomes null, since JSON has no NaN."""
-    typer.echo(
-        json.dumps(_plain(data), indent=indent, ensure_ascii=False, allow_nan=False)
-    )
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if hasattr(value, "tolist"):
-        return _plain(value.tolist())
-    if isinstance(value, float) and (
-        value != value or value in (float("inf"), -float("inf"))
-    ):
-        return None
-    return value
+    typer.echo(dump_json(data, indent=indent))
 
 
 @contextlib.contextmanager

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from .door import read_file
 from .errors import ConfigError
 
 _MARKS = (
@@ -31,8 +32,6 @@ _KINDS = (
 )
 """First bytes of what people name by mistake."""
 
-MEGABYTE = 1 << 20
-
 
 def read_bytes(path: Path, limit_MB: float = 64.0) -> bytes:
     """Return the bytes of a file the user named, never more than the limit.
@@ -42,23 +41,7 @@ def read_bytes(path: Path, limit_MB: float = 64.0) -> bytes:
     ConfigError
         If it is missing, a folder, unreadable, or longer than `limit_MB`.
     """
-    limit = int(limit_MB * MEGABYTE)
-    try:
-        with path.open("rb") as file:
-            data = file.read(limit + 1)
-    except FileNotFoundError:
-        raise ConfigError(f"{path}: there is no such file") from None
-    except IsADirectoryError:
-        raise ConfigError(f"{path}: is a folder, not a file") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise ConfigError(f"{path}: cannot be read: {reason}") from None
-    if len(data) > limit:
-        raise ConfigError(
-            f"{path}: must not be longer than {limit_MB:g} MB; split it, or save fewer "
-            "rows and columns"
-        )
-    return data
+    return read_file(path, limit_MB)
 
 
 def decode_text(data: bytes, path: Path) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import secrets
+import stat
 from pathlib import Path
 
 from .errors import InputError
@@ -58,7 +59,8 @@ def write_bytes(path: Path, data: bytes) -> None:
 
     The bytes go to a temporary file in the same folder, are synced to the disk, renamed
     over `path`, and the folder is synced, so that the rename survives a power cut. A
-    device or pipe (``/dev/stdout``) is written to, never replaced.
+    device or pipe (``/dev/stdout``) is written to, never replaced; a link is written
+    through; the mode of a file that is replaced is kept.
 
     Raises
     ------
@@ -72,13 +74,15 @@ def write_bytes(path: Path, data: bytes) -> None:
     if path.exists() and not path.is_file():
         path.write_bytes(data)
         return
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
+    target = _behind_links(path)
+    temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
     try:
-        with temporary.open("wb") as file:
+        with temporary.open("xb") as file:
+            _keep_mode(file.fileno(), target)
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
-        temporary.replace(path)
+        temporary.replace(target)
     except BaseException as error:
         with contextlib.suppress(OSError):
             temporary.unlink()
@@ -87,7 +91,25 @@ def write_bytes(path: Path, data: bytes) -> None:
             if isinstance(error, FileNotFoundError):
                 error.strerror = f"there is no folder {path.parent}; make it first"
         raise
-    sync_folder(path.parent)
+    sync_folder(target.parent)
+
+
+def _behind_links(path: Path) -> Path:
+    """Return the file that a link leads to: it is written through, never cut."""
+    if not path.is_symlink():
+        return path
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError):
+        raise InputError(f"{path}: is a link that leads nowhere; remove it") from None
+
+
+def _keep_mode(descriptor: int, target: Path) -> None:
+    """Give the new file the mode of the one it replaces: a private file stays so."""
+    if os.name != "posix":
+        return
+    with contextlib.suppress(FileNotFoundError):
+        os.fchmod(descriptor, stat.S_IMODE(target.stat().st_mode))
 
 
 def _check_name(path: Path) -> None:

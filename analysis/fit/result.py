@@ -9,7 +9,6 @@ modulus and remanence enter only as their ratio: asking for both names both.
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.files import write_text
+from ...core.json import write_json
 from ...core.specimen import Specimen
 from .linear import Linear, budget, linear_problem, marginal, statistical
 from .problem import Problem
@@ -322,15 +321,4 @@ def write_fit(
     data = result.as_dict()
     if posterior is not None:
         data["posterior"] = posterior.as_dict()
-    write_text(path, json.dumps(plain(data), indent=2, allow_nan=False) + "\n")
-
-
-def plain(value: Any) -> Any:
-    """Return the value with None for every number that is none."""
-    if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+    write_json(path, data)

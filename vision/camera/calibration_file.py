@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Annotated, Literal
@@ -11,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from ...core.errors import ConfigError, InputError
-from ...core.files import write_text
+from ...core.json import write_json
 from ...core.toml import FileModel, read_toml
 from .calibration import Calibration, View
 
@@ -63,23 +62,23 @@ def write_calibration(calibration: Calibration, path: Path) -> None:
         "board_to_camera_rotation": calibration.rotation.tolist(),
         "board_to_camera_mm": calibration.translation_mm.tolist(),
         "camera_height_mm": calibration.camera_height_mm,
-        "camera_height_sd_mm": _number(calibration.camera_height_sd_mm),
+        "camera_height_sd_mm": calibration.camera_height_sd_mm,
         "camera_height_source": calibration.camera_height_source,
         "tilt_deg": calibration.tilt_deg,
-        "scale_relative_sd": _number(calibration.scale_relative_sd),
-        "rms_px": _number(calibration.rms_px),
+        "scale_relative_sd": calibration.scale_relative_sd,
+        "rms_px": calibration.rms_px,
         "rod_height_mm": calibration.rod_height_mm,
         "print_scale": calibration.print_scale,
         "board": calibration.board,
         "views": [
             {
-                "name": view.name, "rms_px": _number(view.rms_px),
+                "name": view.name, "rms_px": view.rms_px,
                 "corners": view.corners, "used": view.used, "why_not": view.why_not,
             }
             for view in calibration.views
         ],
     }  # fmt: skip
-    write_text(path, json.dumps(data, indent=2, allow_nan=False) + "\n")
+    write_json(path, data)
 
 
 def read_calibration(path: Path) -> Calibration:
@@ -124,10 +123,6 @@ def _calibration(model: CalibrationModel) -> Calibration:
             for view in model.views
         ),
     )
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _or(value: float | None, missing: float) -> float:
