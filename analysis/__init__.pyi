@@ -43,6 +43,21 @@ from .fit.suspects import (
 from .fit.verdict import (
     Verdict as Verdict,
 )
+from .imports.door import (
+    read_shape as read_shape,
+)
+from .imports.door import (
+    read_shapes as read_shapes,
+)
+from .imports.judge import (
+    Reading as Reading,
+)
+from .imports.run import (
+    import_table as import_table,
+)
+from .imports.steps import (
+    write_template as write_template,
+)
 from .report.build import (
     write_report as write_report,
 )

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MODELS = ("uniform", "magnet")
+IMPORTED = "imported"
+"""The model of shapes that another program simulated (`analysis.imports`)."""
+
 COLUMNS = (
     "run", "step", "gap_mm", "flux_mT", "model", "rms_mm", "max_mm", "tip_mm",
     "tip_percent", "tip_angle_deg", "radius_measured_mm", "radius_simulated_mm",
@@ -75,8 +78,8 @@ class Comparison:
         Name of the run folder.
     step : Step
         The step.
-    model : {"uniform", "magnet"}
-        The field model.
+    model : {"uniform", "magnet", "imported"}
+        The field model, or where the simulated shape came from.
     status : str
         ``ok``, or why there is nothing to compare.
     flags : tuple of str
@@ -174,6 +177,11 @@ class RunComparison:
     magnet_fit: sim.MagnetFit | None
     support: sim.Support
 
+    @property
+    def models(self) -> tuple[str, ...]:
+        """The field models, and the imported one where a step has it."""
+        return (*MODELS, IMPORTED) if self.of(IMPORTED) else MODELS
+
     def of(self, model: str) -> tuple[Comparison, ...]:
         """Return the comparisons of one field model."""
         return tuple(c for c in self.comparisons if c.model == model)
@@ -205,7 +213,7 @@ def compare_run(
     comparisons = [
         _compare(run, step, name, specimen, magnet, support, model)
         for step in run.steps
-        for name in MODELS
+        for name in (*MODELS, *((IMPORTED,) if step.imported else ()))
     ]
     return RunComparison(
         run=run,
@@ -235,7 +243,7 @@ def fit_run_magnet(
     magnet : Magnet or None
         The run's magnet with the fitted remanence; the nominal one without readings.
     """
-    steps = [s for s in run.steps if usable_flux(s)]
+    steps = [s for s in run.steps if usable_flux(s) and math.isfinite(s.gap_mm)]
     if run.magnet is None or not steps:
         return None, run.magnet
     sd = [s.flux_sd_mT for s in steps]
@@ -266,6 +274,8 @@ def field_of(
     if model == "magnet":
         if magnet is None:
             return "no magnet: the run's rig file does not describe one"
+        if not math.isfinite(step.gap_mm):
+            return "no gap: the table of this run does not say it"
         return sim.MagnetField(magnet=magnet, gap_mm=step.gap_mm)
     if not usable_flux(step):
         return f"no field reading: the Tesla-meter said {step.flux_status}"
@@ -322,6 +332,11 @@ def _compare(
         flags=_flags(step, frame, specimen),
     )
     problem = frame_problem(frame, specimen)
+    if step.imported is not None and name == IMPORTED:
+        base = replace(base, solution=_as_solution(step.imported))
+        if problem or frame is None or frame.centreline is None:
+            return replace(base, status=problem or "no centreline")
+        return _measured_against(base, frame.centreline, step.imported, None)
     field = field_of(step, name, magnet)
     if isinstance(field, str):
         return replace(base, status=problem or field)
@@ -334,11 +349,20 @@ def _compare(
     return _measured_against(base, frame.centreline, solution.centreline, field)
 
 
+def _as_solution(line: Centreline) -> sim.Solution:
+    """Return an imported shape as a solution of which only the shape is known."""
+    nan = math.nan
+    return sim.Solution(
+        centreline=line, status=IMPORTED, morse_index=-1, error_mm=nan,
+        flux_tip_mT=(nan, nan), root_moment_Nm=nan,
+    )  # fmt: skip
+
+
 def _measured_against(
     base: Comparison,
     measured: Centreline,
     simulated: Centreline,
-    field: sim.UniformField | sim.MagnetField,
+    field: sim.UniformField | sim.MagnetField | None,
 ) -> Comparison:
     try:
         errors = metrics.shape_errors(measured, simulated)
@@ -353,7 +377,7 @@ def _measured_against(
     )
     if 2.0 * metrics.shape_errors(measured, mirrored).rms_mm < errors.rms_mm:
         flags = (*flags, "bends_the_other_way")
-    uniform = sim.solve(uniform_rod(base.specimen), field).centreline
+    uniform = sim.solve(uniform_rod(base.specimen), field).centreline if field else None
     return replace(
         base,
         flags=flags,
@@ -391,6 +415,11 @@ def _flags(step: Step, frame: Frame | None, specimen: Specimen) -> tuple[str, ..
         if frame.status == "ok" and wrong:
             flags.append("width_mismatch")
     return tuple(dict.fromkeys(flags))
+
+
+def models_of(runs: Iterable[RunComparison]) -> tuple[str, ...]:
+    """Return the models that any of the runs has."""
+    return max((run.models for run in runs), key=len, default=MODELS)
 
 
 def comparison_table(runs: Iterable[RunComparison]) -> pd.DataFrame:

@@ -9,7 +9,7 @@ fit is refused with the change that would make it fit; what was mended is said i
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -76,12 +76,15 @@ class Shape:
         What was mended or taken for granted, a word each.
     source : str
         File, and which shape in it.
+    kept : dict of str to ndarray
+        Columns of our own that stood beside points which were taken as they are.
     """
 
     line: Centreline
     parameters: dict[str, float]
     notes: tuple[str, ...]
     source: str
+    kept: dict[str, Array] = field(default_factory=dict)
 
 
 def judged(
@@ -130,6 +133,7 @@ def judged(
     return Shape(
         line=line, parameters=dict(raw.parameters), notes=tuple(notes),
         source=raw.source,
+        kept=dict(raw.kept) if len(raw.points) == len(line.s_mm) else {},
     )  # fmt: skip
 
 
@@ -188,6 +192,7 @@ def _ordered(raw: RawShape, order: Array) -> RawShape:
     return replace(
         raw, points=raw.points[order], s=some(raw.s), theta=some(raw.theta),
         kappa=some(raw.kappa), material=some(raw.material),
+        kept={name: values[order] for name, values in raw.kept.items()},
     )  # fmt: skip
 
 

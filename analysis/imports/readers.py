@@ -18,7 +18,7 @@ from ...core.columns import parse_number
 from ...core.decode import decode_text, read_bytes
 from ...core.errors import ConfigError, MissingExtraError
 from ...core.table import Table, parse_table
-from .shapes import Array, Block
+from .shapes import KEPT, QUANTITIES, Array, Block, head_of
 
 LIMIT_MB = 64.0
 MAX_UNPACKED_MB = 512.0
@@ -56,7 +56,8 @@ def table_block(table: Table, unit: str = "") -> Block:
         if parse_number(first, decimal_comma=table.decimal_comma) is None:
             columns.append((name, cells))
         else:
-            columns.append((name, table.column(i)))
+            needed = head_of(name).quantity in QUANTITIES and name not in KEPT
+            columns.append((name, table.column(i, blanks=not needed)))
     return Block(source=str(table.path), columns=columns, unit=unit)
 
 

@@ -41,6 +41,8 @@ class RawShape:
         What orders the points, in any unit: the coordinate along the undeformed rod.
     parameters : mapping of str to float
         What the shape belongs to, with the names of the file.
+    kept : mapping of str to ndarray, shape (n,)
+        Columns `KEPT` that stand beside the points.
     notes : tuple of str
         What the reader took for granted.
     """
@@ -54,6 +56,7 @@ class RawShape:
     kappa: Array | None = None
     material: Array | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
+    kept: Mapping[str, Array] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
     @property
@@ -97,7 +100,12 @@ ALIASES = {
 }  # fmt: skip
 """Names that programs give to the quantities of a shape; X and Y are the undeformed."""
 
-_QUANTITIES = ("x", "y", "s", "theta", "kappa", "u", "v", "X", "Y")
+QUANTITIES = ("x", "y", "s", "theta", "kappa", "u", "v", "X", "Y")
+KEPT = (
+    "width_mm", "sigma_mm", "x_px", "y_px", "good", "sigma_theta_rad",
+    "sigma_kappa_per_mm", "sigma_width_mm",
+)  # fmt: skip
+"""Columns of our own centrelines that a table may bring besides; kept as they are."""
 
 
 def head_of(text: str) -> _Head:
@@ -135,12 +143,15 @@ def shapes_of(block: Block) -> list[RawShape]:
     if sides and isinstance(sides[0], list):
         return [_between(block, heads, sides[0])]
     cases = list(dict.fromkeys(head.case for head in heads if head.case))
+    is_measured = any(head.quantity == "x" and head.unit != "px" for head in heads)
     shapes = []
     for case in cases or [""]:
         at = {
             head.quantity: i
             for i, head in enumerate(heads)
-            if head.quantity in _QUANTITIES and head.case in ("", case)
+            if head.quantity in QUANTITIES
+            and head.case in ("", case)
+            and not (is_measured and head.unit == "px")
         }
         shapes += _of_case(block, heads, at, case)
     return shapes
@@ -167,11 +178,16 @@ def _of_case(
     kappa, per = numbers("kappa"), heads[at["kappa"]].unit if "kappa" in at else ""
     if kappa is not None and unit and unit_factor(f"per_{unit}", "per_mm"):
         kappa = kappa * (unit_factor(per or f"per_{unit}", f"per_{unit}") or 1.0)
+    kept = {
+        head: values
+        for head, values in block.columns
+        if head in KEPT and isinstance(values, np.ndarray)
+    }
     whole = RawShape(
         source=block.source, points=np.column_stack([x, y]), unit=unit,
         s=numbers("s"), theta=numbers("theta"),
         theta_unit=heads[at["theta"]].unit if "theta" in at else "", kappa=kappa,
-        material=material, parameters=case_parameters(case),
+        material=material, parameters=case_parameters(case), kept=kept,
     )  # fmt: skip
     return _by_parameters(whole, block, heads)
 
@@ -235,10 +251,11 @@ def _by_parameters(
     keys: dict[str, Array] = {}
     names: dict[str, list[str]] = {}
     for (head, values), parsed in zip(block.columns, heads, strict=True):
-        if parsed.quantity in _QUANTITIES or parsed.case:
+        if parsed.quantity in QUANTITIES or parsed.case or head in KEPT:
             continue
         if isinstance(values, np.ndarray):
-            if len(np.unique(values)) <= max(1, len(values) // 3):
+            few = len(np.unique(values)) <= max(1, len(values) // 3)
+            if few and np.all(np.isfinite(values)):
                 keys[head] = values
         elif parsed.quantity.lower() in ("image", "run", "model", "name", "curve"):
             names[head] = values
@@ -267,4 +284,5 @@ def _rows(
         points=whole.points[places], unit=whole.unit, s=some(whole.s),
         theta=some(whole.theta), theta_unit=whole.theta_unit, kappa=some(whole.kappa),
         material=some(whole.material), parameters=parameters, notes=whole.notes,
+        kept={head: values[places] for head, values in whole.kept.items()},
     )  # fmt: skip

@@ -14,7 +14,7 @@ import numpy as np
 from ...core.errors import MagbendError, StoreError
 from ...core.files import write_bytes, write_text
 from ...core.progress import Progress, silent
-from ..compare.compare import MODELS, Comparison, RunComparison
+from ..compare.compare import Comparison, RunComparison, models_of
 from ..fit.models import model_sentence
 from ..fit.result import FitResult
 from ..runs.load import Step
@@ -190,6 +190,7 @@ def _section(
         "label": run.run.label,
         "data": run.run,
         "specimen": specimen_sentence(run),
+        "has_imported": "imported" in run.models,
         "headline": _headline(run),
         "failures": [c for c in run.of("magnet") if not c.ok],
         "warnings": run.run.warnings,
@@ -248,7 +249,7 @@ def specimen_sentence(run: RunComparison) -> str:
 def _headline(run: RunComparison) -> list[dict[str, str]]:
     """Return the few numbers that matter, of the steps that could be compared."""
     cards = []
-    for model in MODELS:
+    for model in run.models:
         done = [c.errors for c in run.of(model) if c.errors]
         if not done:
             continue
@@ -317,11 +318,11 @@ def _provenance(run: RunComparison) -> list[tuple[str, str]]:
         ("id", str(record.get("id", ""))),
         ("created (UTC)", str(record.get("created_utc", ""))),
         ("operator, host", f"{record.get('operator', '')}, {record.get('host', '')}"),
-        ("bench", "twin (simulated devices)" if record.get("twin") else "real devices"),
+        ("bench", _bench(record)),
         ("ended", str(run.run.end.get("status", "cut off, no end.json"))),
         ("versions when recorded", _pairs(record.get("versions"))),
         ("devices", _pairs(record.get("devices"))),
-        ("measured lines", "centrelines.csv, frames.csv (magbend vision extract)"),
+        ("measured lines", "centrelines.csv, frames.csv"),
         ("flux density", "steps.jsonl, as read by the Tesla-meter"),
         ("simulated, uniform", "flux read at the undeformed tip, everywhere"),
         ("simulated, magnet", _magnet_sentence(run)),
@@ -337,6 +338,13 @@ def _provenance(run: RunComparison) -> list[tuple[str, str]]:
             )
         )
     return [(name, text) for name, text in pairs if text.strip(", ")]
+
+
+def _bench(record: dict[str, Any]) -> str:
+    table = record.get("imported")
+    if table:
+        return f"imported from {table['table']} (SHA-256 {table['sha256'][:16]}...)"
+    return "twin (simulated devices)" if record.get("twin") else "real devices"
 
 
 def _pairs(data: Any) -> str:
@@ -384,7 +392,7 @@ def _summary(runs: Sequence[RunComparison], drawing: _Drawing) -> dict[str, Any]
             "steps": sum(len(run.run.steps) for run in runs),
             "failed": sum(not c.ok for run in runs for c in run.of("magnet")),
         },
-        "models": [_model_summary(runs, model) for model in MODELS],
+        "models": [_model_summary(runs, model) for model in models_of(runs)],
         "figure": drawing.add("summary", figures.summary_figure(runs)),
     }
 

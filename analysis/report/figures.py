@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...sim import magnet_flux_mT
-from ..compare.compare import MODELS, Comparison, RunComparison
+from ..compare.compare import Comparison, RunComparison, models_of
 from ..compare.metrics import position_at
 from ..fit.result import FitResult
 from .style import (
@@ -221,7 +221,7 @@ def summary_figure(runs: Sequence[RunComparison]) -> Figure:
     with drawing():
         figure = new_figure(72.0)
         left, right = figure.subplots(1, 2)
-        for model in MODELS:
+        for model in models_of(runs):
             done = [c for run in runs for c in run.of(model) if c.errors]
             rms = np.sort([c.errors.rms_mm for c in done if c.errors])
             tip = [c.errors.tip_percent for c in done if c.errors]

@@ -23,6 +23,7 @@ MAGNET = "#0072b2"
 UNIFORM = "#d55e00"
 GOOD = "#009e73"
 BAD = "#cc3311"
+IMPORTED = "#aa4499"
 
 _VARIABLES = {
     INK: "var(--ink)",
@@ -32,13 +33,18 @@ _VARIABLES = {
     UNIFORM: "var(--uniform)",
     GOOD: "var(--good)",
     BAD: "var(--bad)",
+    IMPORTED: "var(--imported)",
 }
 WIDTH_IN = 181.0 / 25.4
 """Width of a two-column figure, 181 mm."""
 
-MODEL_COLOUR = {"uniform": UNIFORM, "magnet": MAGNET}
-MODEL_DASH = {"uniform": (4.0, 2.0), "magnet": (None, None)}
-MODEL_LABEL = {"uniform": "simulated, uniform field", "magnet": "simulated, magnet"}
+MODEL_COLOUR = {"uniform": UNIFORM, "magnet": MAGNET, "imported": IMPORTED}
+MODEL_DASH = {"uniform": (4.0, 2.0), "magnet": (None, None), "imported": (6.0, 1.5)}
+MODEL_LABEL = {
+    "uniform": "simulated, uniform field",
+    "magnet": "simulated, magnet",
+    "imported": "simulated elsewhere",
+}
 
 _RC = {
     "font.family": "sans-serif",

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +33,7 @@ from ...vision import (
     read_centrelines,
     read_frames,
 )
+from .imported import read_imported
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -45,7 +46,11 @@ POINT_COLUMNS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Step:
-    """One finished step of a run; NaN where nothing was read."""
+    """One finished step of a run; NaN where nothing was read.
+
+    `imported` is a shape that another program simulated for it (see
+    `analysis.imports`), None where there is none.
+    """
 
     index: int
     gap_mm: float
@@ -55,6 +60,7 @@ class Step:
     image: str
     flags: tuple[str, ...] = ()
     time_utc: str = ""
+    imported: Centreline | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -296,8 +302,10 @@ def load_run(path: Path | str) -> RunData:
     try:
         specimen = SpecimenModel.model_validate(record.get("specimen")).specimen()
         magnet = _magnet(record)
+        shapes = read_imported(path)
         steps = tuple(
-            _step(data) for data in sorted(stored.steps, key=lambda d: int(d["index"]))
+            replace(_step(data), imported=shapes.get(int(data["index"])))
+            for data in sorted(stored.steps, key=lambda d: int(d["index"]))
         )
     except (ValidationError, InputError, KeyError, TypeError, ValueError) as error:
         raise StoreError(
@@ -355,11 +363,11 @@ def _step(data: dict[str, Any]) -> Step:
     ]
     return Step(
         index=int(data["index"]),
-        gap_mm=float(data["gap_mm"]),
+        gap_mm=_number(data["gap_mm"]),
         flux_mT=_number(data.get("flux_mT")),
         flux_sd_mT=_number(data.get("flux_sd_mT")),
         flux_status=str(data.get("flux_status") or "none"),
-        image=images[0] if images else "",
+        image=images[0] if images else str(data.get("image") or ""),
         flags=tuple(data.get("flags") or ()),
         time_utc=str(data.get("time_utc", "")),
     )

@@ -48,8 +48,9 @@ class Source:
 def list_sources(paths: Iterable[Path]) -> list[Source]:
     """Return every picture that the user's paths mean, in their order.
 
-    A folder stands for its pictures sorted by name, a run for its ``images/*.png``, a
-    video for its frames. Files of the same name keep the name of their folder.
+    A folder stands for its pictures sorted by name, a run for those in its
+    ``images/``, a video for its frames. Files of the same name keep the name of their
+    folder.
 
     Raises
     ------
@@ -77,12 +78,11 @@ def list_sources(paths: Iterable[Path]) -> list[Source]:
 def _of_folder(folder: Path) -> list[Source]:
     is_run = (folder / "run.json").exists() or (folder / "steps.jsonl").exists()
     within = folder / "images" if is_run else folder
-    suffixes = frozenset({".png"}) if is_run else PICTURES
     found = (
         sorted(
             path
             for path in within.iterdir()
-            if path.suffix.lower() in suffixes
+            if path.suffix.lower() in PICTURES
             and not path.name.startswith(".")
             and not path.is_dir()
         )
