@@ -186,7 +186,11 @@ def _coloured(rng: np.random.Generator, scene: Scene) -> tuple[Scene, str]:
         "red on green board": (RED, GREEN_BOARD), "striped on white": (GREEN, PAPER),
     }[word]  # fmt: skip
     stripe = YELLOW if word.startswith("striped") else None
-    return replace(scene, rod_colour=rod, paper=paper, rod_stripe=stripe), word
+    clamp = scene.clamp
+    if word.endswith("dark board"):  # a black clamp could not be seen there
+        clamp = replace(clamp, colour=GREY)
+    scene = replace(scene, clamp=clamp, rod_colour=rod, paper=paper, rod_stripe=stripe)
+    return scene, word
 
 
 def _cluttered(

@@ -100,6 +100,10 @@ class Measurement:
         Where the specimen frame lies in the board frame; None without a calibration.
     inverted : bool
         Whether the rod is lighter than its ground.
+    mix : tuple of float or None
+        Weights of blue, green and red in whose light it was measured; None is grey.
+    seen_px : tuple of ndarray, shape (n, 2)
+        Of a failed one: axes of the things that might have been the rod.
     """
 
     status: Literal["ok", "failed"]
@@ -117,6 +121,8 @@ class Measurement:
     tip_px: tuple[float, float] = NAN2
     pose: Pose | None = None
     inverted: bool = False
+    mix: tuple[float, float, float] | None = None
+    seen_px: tuple[NDArray[np.float64], ...] = ()
 
     @property
     def ok(self) -> bool:

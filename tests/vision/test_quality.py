@@ -14,6 +14,7 @@ from magbend.vision.extraction.quality import _goes_on, doubts
 from magbend.vision.extraction.refine import refine
 from magbend.vision.extraction.setting import Setting
 from magbend.vision.find.binarise import binarise
+from magbend.vision.find.ground import View
 from magbend.vision.find.rod import find_candidates
 from magbend.vision.find.track import start_curve
 from magbend.vision.measurement import Measurement
@@ -48,13 +49,13 @@ def test_root_put_short_of_the_clamp_is_doubted():
 
 def test_direction_that_leaves_the_tip_unsure_is_doubted():
     photo, rod, refined = measured()
-    setting = Setting()
+    setting, view = Setting(), View(grey=photo.grey, sign=1.0)
 
     def flags(sd_deg):
         line = Measurement(
             status="ok", length_mm=30.0, width_px=20.0, clamp_angle_sd_deg=sd_deg
         )
-        return doubts(line, photo, refined, rod, setting).flags
+        return doubts(line, photo, view, refined, rod, setting).flags
 
     assert "direction_doubtful" not in flags(0.25)  # 0.13 mm at the tip
     assert "direction_doubtful" in flags(0.35)  # 0.18 mm

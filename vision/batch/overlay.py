@@ -40,7 +40,8 @@ def draw_overlay(
     photo : Photo
         The photograph.
     measurement : Measurement
-        A failed one is crossed out and says why.
+        A failed one is crossed out and says why; what might have been the rod is
+        drawn and numbered, the likeliest first.
     max_side_px : int
         Larger photographs are shown at a half, a third ... of their scale.
 
@@ -63,6 +64,7 @@ def draw_overlay(
         _draw_found(picture, measurement, scale)
     else:
         _cross_out(picture)
+        _draw_seen(picture, measurement, scale)
     _caption(picture, measurement)
     return picture
 
@@ -121,6 +123,20 @@ def _cross_out(picture: NDArray[np.uint8]) -> None:
         ((0.0, 0.0), (width, height)), ((width, 0.0), (0.0, height)),
     ):  # fmt: skip
         draw_line(picture, np.array([a, b]), WRONG)
+
+
+def _draw_seen(
+    picture: NDArray[np.uint8], measurement: Measurement, scale: float
+) -> None:
+    """Draw and number the things that might have been the rod."""
+    size = max(0.35, picture.shape[1] / 2600)
+    for number, points in enumerate(measurement.seen_px, start=1):
+        line = (points + 0.5) * scale - 0.5
+        draw_line(picture, line, AXIS, 2)
+        x, y = np.round(line[len(line) // 2]).astype(int)
+        at = (int(x) + 6, int(y) - 6)
+        font = cv2.FONT_HERSHEY_SIMPLEX
+        cv2.putText(picture, str(number), at, font, size, AXIS, 2, cv2.LINE_AA)
 
 
 def _caption(picture: NDArray[np.uint8], measurement: Measurement) -> None:

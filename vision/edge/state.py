@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -23,12 +24,15 @@ class LostError(Exception):
     ----------
     flag, reason : str
         As in `Measurement`.
+    seen_px : sequence of ndarray, shape (n, 2)
+        Axes of the things in the picture that might be the rod.
     """
 
-    def __init__(self, flag: str, reason: str) -> None:
+    def __init__(self, flag: str, reason: str, seen_px: Sequence[Array] = ()) -> None:
         super().__init__(reason)
         self.flag = flag
         self.reason = reason
+        self.seen_px = tuple(seen_px)
 
 
 @dataclass(slots=True)

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from ...core.errors import MagbendError
 from ..camera.calibration import Calibration
 from ..edge.state import LostError
-from ..find.binarise import binarise
-from ..find.choose import find_rod
+from ..find.choose import find_rod, search_rod
+from ..find.ground import View
 from ..find.rod import Candidate
 from ..find.track import Start, start_curve
 from ..measurement import Measurement, failure
 from ..picture.photo import Photo
 from .bare import flattened
-from .quality import doubts, refusal
+from .quality import TIP_GOES_ON, doubts, refusal
 from .refine import refine
 from .setting import Setting
 from .specimen_frame import measurement
@@ -75,7 +75,8 @@ def measure(photo: Photo, setting: Setting) -> Measurement:
             photo = flattened(photo, setting.bare)
         return _measure(photo, setting)
     except LostError as lost:
-        return failure(lost.flag, lost.reason)
+        refused = failure(lost.flag, lost.reason)
+        return replace(refused, seen_px=lost.seen_px)
     except MagbendError as error:
         return failure("calibration_mismatch", str(error))
     except BROKEN as error:
@@ -83,37 +84,58 @@ def measure(photo: Photo, setting: Setting) -> Measurement:
 
 
 def _measure(photo: Photo, setting: Setting) -> Measurement:
-    binary = binarise(photo.grey, invert=setting.invert)
-    if binary is None:
-        return _empty(photo)
-    binary, candidate = find_rod(photo, binary, setting.invert, setting.clamp)
-    sign = -1.0 if binary.inverted else 1.0
-    grey, start = photo.grey, _start(photo.grey, candidate, sign)
+    """Measure what one level of lightness shows, else what all levels show."""
+    sought = setting.sought(photo.size_px)
+    quick, doubt = None, LostError("no_rod", "nothing stands out from the background")
+    try:
+        quick = _of_rod(photo, setting, *find_rod(photo, sought))
+        if TIP_GOES_ON not in quick.flags:
+            return quick
+    except LostError as lost:
+        doubt = lost
+    except BROKEN:
+        pass
+    try:
+        whole = _of_rod(photo, setting, *search_rod(photo, sought))
+    except (LostError, *BROKEN) as lost:
+        if quick is not None:
+            return quick
+        if isinstance(lost, LostError) and lost.seen_px:
+            raise
+        raise _empty(photo) or doubt from None
+    if quick is not None and whole.length_px < quick.length_px:
+        return quick
+    return whole
+
+
+def _of_rod(
+    photo: Photo, setting: Setting, candidate: Candidate, view: View
+) -> Measurement:
+    grey, sign = view.grey, view.sign
+    start = _start(grey, candidate, sign)
     if start.rough:
         # Strands, gaps and hairs blurred away, what is left is how much is rod.
         blur = SMOOTH * start.width
         grey = np.asarray(cv2.GaussianBlur(grey, (0, 0), blur))
         soft = _start(grey, candidate, sign, blur)
         start = replace(soft, rough=True, width=start.width)
-    return finish(photo, grey, start, candidate, setting, sign=sign)
+    return finish(photo, replace(view, grey=grey), start, candidate, setting)
 
 
 def finish(
-    photo: Photo, grey: Image, start: Start, candidate: Candidate, setting: Setting, *,
-    sign: float, near: bool = False,
+    photo: Photo, view: View, start: Start, candidate: Candidate, setting: Setting, *,
+    near: bool = False,
 ) -> Measurement:  # fmt: skip
     """Refine, judge and turn into mm what starts from a curve near the axis.
 
     Parameters
     ----------
-    photo, grey
+    photo, view
         The photograph, and its light as it is to be refined.
     start, candidate
         The curve, and what was found before it.
     setting : Setting
         What is known.
-    sign : float
-        -1 for a light rod.
     near : bool
         Whether the rod need not be sought any more; see `refine`.
 
@@ -124,16 +146,17 @@ def finish(
     """
     calibrated = setting.calibration is not None
     refined = refine(
-        grey, start, root=candidate.root, sign=sign, joints=setting.joints_px,
-        walls=setting.walls_px if calibrated and sign > 0.0 else None,
+        view.grey, start, root=candidate.root, sign=view.sign,
+        joints=setting.joints_px,
+        walls=setting.walls_px if calibrated and view.sign > 0.0 else None,
         face_px=setting.face_px(start.curve), near=near,
     )  # fmt: skip
     if near and not refined.settled:
         raise LostError("edges_lost", "the rod moved too far since the last frame")
     refusal(photo, refined, candidate)
     result = measurement(refined, candidate, setting)
-    result = replace(result, inverted=sign < 0.0)
-    return doubts(result, photo, refined, candidate, setting)
+    result = replace(result, inverted=view.sign < 0.0, mix=view.mix)
+    return doubts(result, photo, view, refined, candidate, setting)
 
 
 def _start(grey: Image, candidate: Candidate, sign: float, blur: float = 1.0) -> Start:
@@ -146,9 +169,12 @@ def _start(grey: Image, candidate: Candidate, sign: float, blur: float = 1.0) ->
     return start
 
 
-def _empty(photo: Photo) -> Measurement:
+def _empty(photo: Photo) -> LostError | None:
+    """Return what keeps anything from being seen; None where that is not the light."""
     if photo.clipped > 0.5:
-        return failure("overexposed", "the picture is white all over; expose it less")
+        return LostError("overexposed", "the picture is white all over; expose it less")
     if float(photo.grey.max()) < 0.02:
-        return failure("underexposed", "the picture is black all over; expose it more")
-    return failure("no_rod", "nothing stands out from the background")
+        return LostError(
+            "underexposed", "the picture is black all over; expose it more"
+        )
+    return None

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from ...core.errors import MagbendError
 from ..edge.state import LostError, Root
+from ..find.ground import View, mixed
 from ..find.rod import Candidate
 from ..find.track import Start, start_curve
 from ..measurement import Measurement
@@ -76,7 +77,6 @@ def follow(
 
 def _near(photo: Photo, setting: Setting, last: Measurement) -> Measurement | None:
     """Return the same rod as found about the last axis; None where it is not."""
-    sign = -1.0 if last.inverted else 1.0
     rod = Candidate(
         points_px=last.points_px, width_px=last.width_px, length_px=last.length_px,
         root=_root(last), contacts=1, ratio=0.0,
@@ -85,12 +85,13 @@ def _near(photo: Photo, setting: Setting, last: Measurement) -> Measurement | No
         setting.calibration.check_size(*photo.size_px)
     if setting.bare is not None:
         photo = flattened(photo, setting.bare)
+    view = mixed(photo, last.mix, -1.0 if last.inverted else 1.0)
     for reach in REACHES:
         try:
-            start = _start(photo, rod, sign, reach)
+            start = _start(view, rod, reach)
             if start is None:
                 continue
-            found = finish(photo, photo.grey, start, rod, setting, sign=sign, near=True)
+            found = finish(photo, view, start, rod, setting, near=True)
         except (LostError, *BROKEN):
             continue
         if found.ok and _same(found.length_px, found.width_px, last):
@@ -98,9 +99,9 @@ def _near(photo: Photo, setting: Setting, last: Measurement) -> Measurement | No
     return None
 
 
-def _start(photo: Photo, rod: Candidate, sign: float, reach: float) -> Start | None:
+def _start(view: View, rod: Candidate, reach: float) -> Start | None:
     start = start_curve(
-        photo.grey, rod.points_px, reach * rod.width_px, sign=sign,
+        view.grey, rod.points_px, reach * rod.width_px, sign=view.sign,
         follow=rod.root == "clamp",
     )  # fmt: skip
     if start is None or start.rough:

@@ -10,6 +10,7 @@ from ..camera.calibration import Calibration
 from ..curve.robust import median, quantile
 from ..edge.state import LostError
 from ..edge.step_line import lanes
+from ..find.ground import View
 from ..find.rod import Candidate
 from ..measurement import Measurement
 from ..picture.photo import Photo
@@ -24,6 +25,10 @@ TURN_MM = 0.15
 
 SCALE = 5e-4
 """Doubt of the scale, for want of the camera's height, above which it is named."""
+
+TIP_GOES_ON = "tip_goes_on"
+PALER_TIP = 0.12
+"""Step to either side beyond the tip, over the rod's, that a shade does not have."""
 
 SHADE_PX = 0.04
 """Pull of a shade on the midline, before correction, above which it is named."""
@@ -59,6 +64,7 @@ def refusal(photo: Photo, refined: Refined, candidate: Candidate) -> None:
 def doubts(
     result: Measurement,
     photo: Photo,
+    view: View,
     refined: Refined,
     candidate: Candidate,
     setting: Setting,
@@ -77,6 +83,8 @@ def doubts(
         flags.append("root_hidden")
     if candidate.root == "clamp" and _goes_on(photo, refined):
         flags.append("clamp_doubtful")
+    if not refined.rough and _tip_goes_on(view, refined):
+        flags.append(TIP_GOES_ON)
     if direction_is_doubtful(result.clamp_angle_sd_deg, result.length_mm):
         flags.append("direction_doubtful")
     if photo.clipped > 0.01:
@@ -93,6 +101,23 @@ def doubts(
     if nominal is not None and abs(length / nominal - 1.0) > LENGTH_TOLERANCE:
         flags.append("length_mismatch")
     return replace(result, flags=tuple(flags))
+
+
+def _tip_goes_on(view: View, refined: Refined) -> bool:
+    """Whether something as wide as the rod goes on beyond its tip, paler than it.
+
+    Then it may be the rod, in another colour; a shade has softer edges.
+    """
+    width = refined.typical_width
+    beside = 0.5 * width + 4.0
+    across = np.array([-beside, -0.25 * width, 0.0, 0.25 * width, beside])
+    curve = refined.fit.curve
+    s = np.linspace(1.0, 3.0, 9) * width
+    beyond = lanes(view.grey, curve, curve.s[-1] + s, across, view.sign)
+    before = lanes(view.grey, curve, curve.s[-1] - s, across, view.sign)
+    contrast = median(before[::4].ravel()) - median(before[1:4].ravel())
+    step = np.minimum(beyond[0], beyond[4]) - beyond[1:4].max(axis=0)
+    return bool(quantile(step, 0.25) > PALER_TIP * contrast)
 
 
 def _scale_sd(camera: Calibration, rod_height_mm: float) -> float:

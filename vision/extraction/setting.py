@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..camera.calibration import Calibration
 from ..camera.projection import LocalView, local_view
 from ..curve.curve import Curve
-from ..find.choose import Clamp
+from ..find.choose import Clamp, Sought
 from ..picture.photo import Photo
 
 Array = NDArray[np.float64]
@@ -38,6 +38,8 @@ class Setting:
         Arc lengths at which the stiffness jumps, and so the curvature may.
     length_mm : float or None
         Nominal free length; a measured length 2 % off is flagged ``length_mismatch``.
+    side_mm : float or None
+        Nominal side of its section: tells the rod from other long thin things.
     clamp : {"auto", "none"}
         ``none`` also measures a rod that floats freely, from one end to the other.
     clamp_height_mm : float or None
@@ -52,6 +54,7 @@ class Setting:
     invert: bool | None = None
     joints_mm: tuple[float, ...] = ()
     length_mm: float | None = None
+    side_mm: float | None = None
     clamp: Clamp = "auto"
     clamp_height_mm: float | None = None
     bare: Photo | None = None
@@ -70,6 +73,19 @@ class Setting:
             data["bare"] = hashlib.sha256(self.bare.grey.tobytes()).hexdigest()
         text = json.dumps(data, sort_keys=True, default=np.ndarray.tolist)
         return hashlib.sha256(text.encode()).hexdigest()
+
+    def sought(self, size_px: tuple[int, int]) -> Sought:
+        """Return what is known of the rod in a picture of a size."""
+        known = Sought(invert=self.invert, clamp=self.clamp)
+        if self.calibration is None:
+            return known
+        middle = (0.5 * size_px[0], 0.5 * size_px[1])
+        scale = self.calibration.mm_per_px(middle, height_mm=self.axis_height_mm)
+        return replace(
+            known,
+            width_px=(self.side_mm or 0.0) / scale,
+            length_px=(self.length_mm or 0.0) / scale,
+        )
 
     def joints_px(self, curve: Curve) -> Sequence[float]:
         """Return the joints as arc lengths in px on a curve."""

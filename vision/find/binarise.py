@@ -136,7 +136,7 @@ def _background(
     height, width = work.shape
     step = max(1, int((height * width / _SAMPLE) ** 0.5))
     sample = work[::step, ::step]
-    basis = _quadric(*sample.shape)
+    basis = quadric(*sample.shape)
     value = sample.astype(np.float64).ravel()
     lower, typical, upper = _quantiles(value, 0.4, 0.6, 0.7)
     coefficients = _fit_quadric(basis, value, lower, upper)
@@ -165,7 +165,7 @@ def _fit_quadric(
 
 
 @lru_cache(maxsize=8)
-def _quadric(height: int, width: int) -> NDArray[np.float64]:
+def quadric(height: int, width: int) -> NDArray[np.float64]:
     """Return the terms of a quadric at the points of a grid from -1 to 1."""
     rows, columns = np.linspace(-1.0, 1.0, height), np.linspace(-1.0, 1.0, width)
     y, x = np.meshgrid(rows, columns, indexing="ij")

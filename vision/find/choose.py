@@ -2,16 +2,34 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..edge.state import LostError
 from ..picture.photo import Photo
 from .binarise import Binary, binarise, rebinarise
+from .ground import LEVELS, View, best_view, ground_distance
 from .rod import LEAST_SHARE, Candidate, find_candidates
+from .things import Thing, find_things
 
+Array = NDArray[np.float64]
 Clamp = Literal["auto", "none"]
+
+_NO_CLAMP = (
+    "the rod grows from no clamp and from no border of the picture; "
+    "for a rod that floats freely say so with clamp none"
+)
+_SIZE = 1.6
+"""Factor by which a thing may be larger or smaller than the rod that is sought."""
+
+_AS_CLEAR = 0.6
+"""Share of the levels, and of the worth, at which another thing is as likely."""
+
+_SHOWN = 6
+"""Things that are drawn on the overlay of a refusal."""
 
 _PALER = 0.25
 """How much lighter than the rod, of the paper's light, a thing is that is no rod."""
@@ -20,28 +38,132 @@ LEAST_LENGTH = 0.08
 """Shortest rod, in diagonals of the picture: below that it is dust, hair or print."""
 
 
-def find_rod(
-    photo: Photo, binary: Binary, invert: bool | None, clamp: Clamp
-) -> tuple[Binary, Candidate]:
-    """Return the rod and its mask; glints make grey paper look like a dark board."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sought:
+    """What is known of a rod before its picture is looked at.
+
+    Parameters
+    ----------
+    invert : bool or None
+        Whether it is lighter than the ground; None looks for itself.
+    clamp : {"auto", "none"}
+        ``none`` takes a rod that floats freely too.
+    width_px, length_px : float
+        About how wide and long it is seen; 0 where that is not known.
+    """
+
+    invert: bool | None = None
+    clamp: Clamp = "auto"
+    width_px: float = 0.0
+    length_px: float = 0.0
+
+    def fits(self, rod: Candidate) -> bool:
+        """Whether a candidate has about the size of the rod."""
+        width, length = rod.width_px, rod.length_px
+        return (not self.width_px or 1 / _SIZE < width / self.width_px < _SIZE) and (
+            not self.length_px or 1 / _SIZE < length / self.length_px < _SIZE
+        )
+
+
+def find_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
+    """Return the rod as one level of lightness shows it: quick, and enough for most.
+
+    Raises
+    ------
+    LostError
+        If no rod is seen there, or none that stands out.
+    """
+    binary = binarise(photo.grey, invert=sought.invert)
+    if binary is None:
+        raise LostError("no_rod", "nothing stands out from the background")
     try:
-        return binary, _choose(binary, clamp)
+        rod = _choose(binary, sought)
     except LostError as lost:
-        if lost.flag != "no_rod" or invert is not None or not binary.inverted:
+        # Glints make grey paper look like a dark board.
+        if lost.flag != "no_rod" or sought.invert is not None or not binary.inverted:
             raise
         dark = binarise(photo.grey, invert=False)
         if dark is None:
             raise
-        return dark, _choose(dark, clamp)
+        binary, rod = dark, _choose(dark, sought)
+    return rod, View(grey=photo.grey, sign=-1.0 if binary.inverted else 1.0)
 
 
-def _choose(binary: Binary, clamp: Clamp) -> Candidate:
+def search_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
+    """Return the rod as all levels of lightness and colour together show it.
+
+    Raises
+    ------
+    LostError
+        If there is none, or another as likely, with the axes of what was seen.
+    """
+    binary = ground_distance(photo)
+    least = LEAST_LENGTH * binary.factor * float(np.hypot(*binary.mask.shape))
+    things = find_things(binary, [1.0 - level for level in LEVELS], least)
+    if sought.width_px or sought.length_px:
+        things = [thing for thing in things if sought.fits(thing.best)] or things
+    if not things:
+        raise LostError("no_rod", "nothing in the picture is long and thin like a rod")
+    first, seen = things[0], [thing.best.points_px for thing in things[:_SHOWN]]
+    rivals = [other for other in things[1:] if _rivals(first, other)]
+    rod = first.best
+    if rivals:
+        raise _too_many([rod, *(other.best for other in rivals)], seen)
+    if rod.root == "free" and sought.clamp != "none":
+        raise LostError("no_clamp", _NO_CLAMP, seen)
+    try:
+        _accept(rod)
+    except LostError as lost:
+        raise LostError(lost.flag, lost.reason, seen) from None
+    view = best_view(photo, rod.points_px, rod.width_px)
+    lighter = view.sign < 0.0
+    if sought.invert is not None and view.mix is None and lighter != sought.invert:
+        raise LostError(
+            "no_rod",
+            f"the only thing like a rod is {'lighter' if lighter else 'darker'} than "
+            "its ground, and you said the contrary",
+            seen,
+        )
+    return rod, view
+
+
+def _too_many(rods: list[Candidate], seen: list[Array]) -> LostError:
+    if len(rods) == 2:
+        return LostError(
+            "two_rods",
+            "there are two things like a rod in the picture, "
+            f"{rods[0].length_px:.0f} and {rods[1].length_px:.0f} px long; cover one "
+            "of them",
+            seen,
+        )
+    return LostError(
+        "no_rod",
+        f"there are {len(rods)} long and thin things in the picture and none that "
+        "stands out as the rod",
+        seen,
+    )
+
+
+def _rivals(first: Thing, other: Thing) -> bool:
+    """Whether another thing could as well be the rod: of its size, held as it is."""
+    one, two = first.best, other.best
+    return (
+        0.5 < two.width_px / one.width_px < 2.0
+        and two.length_px > 0.4 * one.length_px
+        and (one.root != "clamp" or two.root == "clamp")
+        and len(other.seen) > _AS_CLEAR * len(first.seen)
+        and other.worth > _AS_CLEAR * first.worth
+    )
+
+
+def _choose(binary: Binary, sought: Sought) -> Candidate:
     """Return the rod; a paler clamp shows only at higher levels."""
     best: Candidate | None = None
     least = LEAST_LENGTH * binary.factor * float(np.hypot(*binary.mask.shape))
     for level in _levels(binary):
         at_level = binary if level == binary.threshold else rebinarise(binary, level)
         rods = [item for item in find_candidates(at_level) if item.length_px > least]
+        rods = [item for item in rods if sought.fits(item)] or rods
         if not rods:
             continue
         rod = _likeliest(rods)
@@ -53,13 +175,9 @@ def _choose(binary: Binary, clamp: Clamp) -> Candidate:
         best = best or rod
     if best is None:
         raise LostError("no_rod", "nothing in the picture is long and thin like a rod")
-    if clamp == "none":
+    if sought.clamp == "none":
         return best
-    raise LostError(
-        "no_clamp",
-        "the rod grows from no clamp and from no border of the picture; "
-        "for a rod that floats freely say so with clamp none",
-    )
+    raise LostError("no_clamp", _NO_CLAMP)
 
 
 def _levels(binary: Binary) -> list[float]:
@@ -104,18 +222,10 @@ def _refuse_second(first: Candidate, rods: list[Candidate]) -> None:
         and 0.5 < other.width_px / first.width_px < 2.0
         and other.length_px > 0.4 * first.length_px
         and other.ratio < first.ratio + _PALER
+        and (first.root != "clamp" or other.root == "clamp")
     ]
-    if len(alike) == 1:
-        raise LostError(
-            "two_rods",
-            "there are two things like a rod in the picture; cover one of them",
-        )
     if alike:
-        raise LostError(
-            "no_rod",
-            f"there are {len(alike) + 1} long and thin things in the picture and none "
-            "that stands out as the rod",
-        )
+        raise _too_many([first, *alike], [])
 
 
 def _accept(rod: Candidate) -> Candidate:

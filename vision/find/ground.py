@@ -1,0 +1,172 @@
+"""How far every pixel is from the paper, in lightness and in colour.
+
+What a person calls the paper is most of the picture, whatever its colour; the light on
+it falls off smoothly. So the light is fitted in each of the three channels, and the
+distance is that of CIELAB (1976), in which equal steps look equally large: a red rod
+on a green board of the same lightness is as far from it as a grey one from white.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..curve.robust import median, quantile
+from ..picture.photo import Photo
+from .binarise import WORK_PX, Binary, quadric
+
+Array = NDArray[np.float64]
+Image = NDArray[np.float32]
+
+LEVELS = (0.62, 0.5, 0.4, 0.32, 0.25, 0.19, 0.14, 0.1, 0.07)
+"""Distances from the paper at which things are looked at: black on white is 0.7 to 0.9,
+deep shade 0.3, and the fibres of paper 0.02."""
+
+_SAMPLE = 1500
+_FALLS_OFF, _GRAIN = 0.4, 0.006
+"""Pixels that tell the paper's light; by how much it may fall off across the picture,
+as a logarithm; and how far noise scatters dark ones."""
+
+_BETTER = 1.5
+"""So much more must a mix of colours tell rod from paper than lightness does."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """A picture in the light that tells its rod best.
+
+    Parameters
+    ----------
+    grey : ndarray, shape (h, w), float32
+        Linear light, or a mix of it.
+    sign : float
+        -1 where the rod is lighter than the paper.
+    mix : tuple of float or None
+        Weights of blue, green and red; None is the photograph's own grey.
+    """
+
+    grey: Image
+    sign: float
+    mix: tuple[float, float, float] | None = None
+
+
+def ground_distance(photo: Photo) -> Binary:
+    """Return a picture whose `ratio` is 1 less the distance from the paper.
+
+    Its mask is empty; `rebinarise` makes one at a level.
+    """
+    factor = max(1, round(max(photo.grey.shape) / WORK_PX))
+    colour = photo.colour()
+    light = photo.grey[..., None] if colour is None else colour
+    height, width = (side // factor for side in light.shape[:2])
+    whole = light[: height * factor, : width * factor]
+    small = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
+    small = np.asarray(small, np.float32).reshape(height, width, -1)
+    bare = np.dstack([_paper_light(small[..., k]) for k in range(small.shape[2])])
+    typical = np.median(bare, axis=(0, 1)).astype(np.float32)
+    level = np.clip(small / bare * typical, 0.0, 1.5)
+    if level.shape[2] == 1:
+        level, typical = np.repeat(level, 3, axis=2), np.repeat(typical, 3)
+    brightest = np.quantile(level[::4, ::4].max(axis=2), 0.998)
+    white = np.float32(max(1e-3, float(typical.max()), float(brightest)))
+    lab = cv2.cvtColor(np.ascontiguousarray(level / white), cv2.COLOR_LBGR2Lab)
+    paper = cv2.cvtColor((typical / white).reshape(1, 1, 3), cv2.COLOR_LBGR2Lab)
+    away = np.sqrt(np.sum((lab - paper) ** 2, axis=2)) / np.float32(100.0)
+    return Binary(
+        ratio=np.asarray(1.0 - away, np.float32),
+        mask=np.zeros((height, width), np.uint8), factor=factor, inverted=False,
+        dark=0.0, threshold=0.0,
+    )  # fmt: skip
+
+
+def best_view(photo: Photo, points_px: Array, width_px: float) -> View:
+    """Return the light in which a rod stands out best all along.
+
+    Parameters
+    ----------
+    photo : Photo
+        The photograph.
+    points_px : ndarray, shape (n, 2)
+        Points inside the rod, one after the other.
+    width_px : float
+        Its width.
+    """
+    rod, left, right = _beside(points_px, width_px, photo.grey.shape)
+    grey = _sampled(photo.grey, rod)
+    paper = 0.5 * (_sampled(photo.grey, left) + _sampled(photo.grey, right))
+    own = View(grey=photo.grey, sign=1.0 if median(paper - grey) > 0.0 else -1.0)
+    colour = photo.colour()
+    if colour is None:
+        return own
+    step = 0.5 * (_sampled(colour, left) + _sampled(colour, right))
+    step = step - _sampled(colour, rod)
+    towards = np.median(step, axis=0)
+    mixes = [np.eye(3)[k] * np.sign(towards[k] or 1.0) for k in range(3)]
+    mixes.append(towards / max(float(np.abs(towards).sum()), 1e-9))
+    contrast = [quantile(step @ mix, 0.1) for mix in mixes]
+    best = int(np.argmax(contrast))
+    if contrast[best] < _BETTER * quantile(own.sign * (paper - grey), 0.1):
+        return own
+    mix = 0.65 * mixes[best] / max(median(step @ mixes[best]), 1e-6)
+    mixed = np.asarray(colour @ mix.astype(np.float32), np.float32)
+    b, g, r = (float(part) for part in mix)
+    return View(grey=mixed, sign=1.0, mix=(b, g, r))
+
+
+def mixed(photo: Photo, mix: tuple[float, float, float] | None, sign: float) -> View:
+    """Return the view of another photograph of the same rod."""
+    colour = None if mix is None else photo.colour()
+    if colour is None:
+        return View(grey=photo.grey, sign=sign)
+    grey = np.asarray(colour @ np.array(mix, np.float32), np.float32)
+    return View(grey=grey, sign=sign, mix=mix)
+
+
+def _paper_light(work: Image) -> Image:
+    """Return the light on the bare paper in one channel: a quadric through its mode.
+
+    The commonest light is the paper's, give or take what it falls off; what is not
+    near the quadric is something else.
+    """
+    height, width = work.shape
+    step = max(1, int((height * width / _SAMPLE) ** 0.5))
+    sample = work[::step, ::step]
+    basis, value = quadric(*sample.shape), np.maximum(sample, 1e-4).ravel()
+    logs = np.sort(np.log(value.astype(np.float64)))
+    within = np.searchsorted(logs, logs + _FALLS_OFF) - np.arange(logs.size)
+    first = int(np.argmax(within))
+    middle = float(np.exp(np.median(logs[first : first + within[first]])))
+    light = np.full(value.size, middle)
+    coefficients = np.array([middle, 0.0, 0.0, 0.0, 0.0, 0.0])
+    for band in (0.45, 0.25, 0.15, 0.1, 0.1):
+        inside = np.abs(value - light) < band * light + _GRAIN
+        if inside.sum() < 60:
+            break
+        coefficients = np.linalg.lstsq(basis[inside], value[inside], rcond=None)[0]
+        light = np.maximum(basis @ coefficients, 0.2 * middle)
+    y, x = (np.linspace(-1.0, 1.0, side, dtype=np.float32) for side in work.shape)
+    c, y = coefficients.astype(np.float32), y[:, None]
+    fitted = c[0] + x * (c[1] + c[3] * x) + y * (c[2] + c[5] * y + c[4] * x)
+    return np.asarray(np.maximum(fitted, 0.2 * middle), np.float32)
+
+
+def _beside(
+    points: Array, width: float, shape: tuple[int, ...]
+) -> tuple[Array, Array, Array]:
+    """Return points in a rod, and as many on the paper at its left and right."""
+    along = np.gradient(points, axis=0)
+    along /= np.maximum(np.hypot(*along.T), 1e-9)[:, None]
+    across = np.column_stack([-along[:, 1], along[:, 0]]) * (0.5 * width + 4.0)
+    inner = slice(1, -1) if len(points) > 4 else slice(None)
+    spots = points[inner], (points - across)[inner], (points + across)[inner]
+    limit = np.array([shape[1] - 1, shape[0] - 1])
+    low, middle, high = (np.clip(spot, 0, limit) for spot in spots)
+    return low, middle, high
+
+
+def _sampled(light: Image, points: Array) -> Array:
+    x, y = np.rint(points).astype(int).T
+    return np.asarray(light[y, x], np.float64)

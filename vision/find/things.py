@@ -1,0 +1,97 @@
+"""Long thin things at every level: the branches of a component tree, and their worth.
+
+At one level a rod may be joined to a shade, at another cut off from a pale clamp; over
+all levels it is what keeps its width and its place. Each candidate of each level is
+laid to those of other levels that it covers; what is seen at many levels is a thing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .binarise import Binary, rebinarise
+from .rod import Candidate, find_candidates
+
+_RANK = {"clamp": 2, "border": 1, "free": 0}
+_ALIKE_WIDTH, _ALIKE_LENGTH = 1.7, 0.6
+_THIN = 25.0
+"""Length over width above which a thing is no more like a rod: lines are longer."""
+LEAST_LEVELS = 2
+"""Seen at fewer levels, a thing is a pattern of noise."""
+
+
+@dataclass(slots=True)
+class Thing:
+    """One thing at all levels at which it is seen, the strictest first."""
+
+    seen: list[Candidate] = field(default_factory=list)
+
+    @property
+    def best(self) -> Candidate:
+        """How it is seen best: from its root on, and with the least of its shade."""
+        rank = max(_rank(item) for item in self.seen)
+        longest = max(item.length_px for item in self.seen if _rank(item) == rank)
+        return next(
+            item
+            for item in self.seen
+            if _rank(item) == rank and item.length_px > 0.93 * longest
+        )
+
+    @property
+    def worth(self) -> float:
+        """How likely it is the rod: seen at many levels, held, and whole."""
+        best = self.best
+        whole = 0.5 if best.contacts > 1 else 1.0
+        thin = min(best.slenderness, _THIN) ** 0.5
+        return whole * (len(self.seen) + 3.0 * _RANK[best.root]) * thin
+
+    def covers(self, other: Candidate) -> bool:
+        """Whether a candidate of another level is this thing."""
+        for item in (self.seen[-1], self.seen[0]):
+            width = max(item.width_px, other.width_px)
+            middle = item.points_px[len(item.points_px) // 2]
+            other_middle = other.points_px[len(other.points_px) // 2]
+            near = item.away(other_middle) < width or other.away(middle) < width
+            if near and _within(item.width_px, other.width_px, 1.0 / _ALIKE_WIDTH):
+                return _within(item.length_px, other.length_px, _ALIKE_LENGTH)
+        return False
+
+
+def find_things(
+    binary: Binary, thresholds: Iterable[float], least_px: float
+) -> list[Thing]:
+    """Return the long thin things of a picture, the likeliest rod first.
+
+    Parameters
+    ----------
+    binary : Binary
+        The picture; its `ratio` is below a threshold on things.
+    thresholds : iterable of float
+        The levels, the strictest first.
+    least_px : float
+        Length of the shortest.
+    """
+    things: list[Thing] = []
+    for threshold in thresholds:
+        for item in find_candidates(rebinarise(binary, threshold)):
+            if item.length_px < least_px:
+                continue
+            held = next((thing for thing in things if thing.covers(item)), None)
+            if held is None:
+                things.append(Thing([item]))
+            else:
+                held.seen.append(item)
+    stable = [thing for thing in things if len(thing.seen) >= LEAST_LEVELS]
+    return sorted(stable, key=lambda thing: -thing.worth)
+
+
+def _rank(item: Candidate) -> float:
+    """Return how it is held; touching something else is half a step worse."""
+    return _RANK[item.root] - 0.5 * (item.contacts > 1)
+
+
+def _within(one: float, other: float, ratio: float) -> bool:
+    return bool(ratio < np.divide(one, other) < 1.0 / ratio)
