@@ -8,7 +8,7 @@ import sys
 import typer
 
 from ..core.errors import MagbendError
-from . import analysis, bench, rig, sim, vision
+from . import analysis, bench, panel, rig, sim, vision
 
 app = typer.Typer(
     name="magbend",
@@ -24,6 +24,7 @@ app.add_typer(vision.app, name="vision")
 app.add_typer(sim.app, name="sim")
 app.add_typer(analysis.app, name="analysis")
 app.command("demo", epilog=bench.DEMO_EXAMPLE)(bench.demo)
+app.command("panel", epilog=panel.EXAMPLE)(panel.panel)
 app.command("doctor", epilog=bench.DOCTOR_EXAMPLE)(bench.doctor)
 
 

@@ -68,6 +68,7 @@ def open_bench(
     *,
     camera: bool = True,
     control: RunControl | None = None,
+    speed: float | None = None,
 ) -> Iterator[Devices]:
     """Yield open devices; every byte of theirs goes to ``wire.log`` in `folder`.
 
@@ -86,10 +87,12 @@ def open_bench(
         False where no picture is taken.
     control : RunControl, optional
         Of a run: callers may pause it and ask what it does.
+    speed : float, optional
+        Of the computed bench's clock over the wall's; by default it only steps.
     """
-    from ..rig import SteppedClock, SystemClock, WireLog, open_devices, stopping
+    from ..rig import WireLog, open_devices, stopping
 
-    clock: Clock = SystemClock() if twin_seed is None else SteppedClock()
+    clock = _clock(twin_seed, speed)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         log = WireLog(folder / "wire.log", clock)
@@ -110,6 +113,14 @@ def open_bench(
             yield devices
         if twin_seed is not None and camera:
             photograph_board(bench, folder / "board.png")
+
+
+def _clock(twin_seed: int | None, speed: float | None) -> Clock:
+    from ..rig import ScaledClock, SteppedClock, SystemClock
+
+    if twin_seed is None:
+        return SystemClock()
+    return SteppedClock() if speed is None else ScaledClock(speed)
 
 
 @contextlib.contextmanager

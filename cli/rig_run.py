@@ -18,6 +18,7 @@ from .rig_show import print_dry_run, print_scan, print_summary
 if TYPE_CHECKING:
     from ..rig.bench.config import Plan
     from ..rig.bench.devices import Devices
+    from ..rig.runs.control import RunControl
     from ..rig.runs.runner import RunSummary
 
 RUN_EXAMPLE = "Example: magbend rig run plan.toml --out runs/gmc2"
@@ -70,6 +71,13 @@ def run(
     ] = None,
     twin: Twin = False,
     seed: Seed = 1,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            help="Let the twin's clock go so many times as fast as the wall's; by "
+            "default a run takes as long as it computes."
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Carry a plan out and record it.
@@ -88,10 +96,12 @@ def run(
         return
     folder = _run_folder(checked, out, resume)
     readings_mT = _readings_mT(flux_mT, checked.gaps_mm)
+    twin_seed = _twin_seed(checked, twin, seed, readings_mT)
+    if speed is not None and twin_seed is None:
+        raise InputError("--speed is of the twin's clock; real time has one speed")
     summary = _carry_out(
-        checked, folder, resume, readings_mT, assume_gap_mm,
-        _twin_seed(checked, twin, seed, readings_mT), live_port,
-    )  # fmt: skip
+        checked, folder, resume, readings_mT, assume_gap_mm, twin_seed, live_port, speed
+    )
     print_summary(summary, as_json)
     if summary.status != "success":
         raise typer.Exit(1)
@@ -267,6 +277,7 @@ def _carry_out(
     assume_gap_mm: float | None,
     twin_seed: int | None,
     live_port: int | None,
+    speed: float | None,
 ) -> RunSummary:
     from ..rig.runs.control import RunControl
     from ..rig.runs.runner import run as carry_out
@@ -276,9 +287,11 @@ def _carry_out(
     keys = not asks_flux(plan, readings_mT)
     with (
         terminating(),
-        open_bench(plan, folder, readings_mT, twin_seed, control=control) as devices,
+        open_bench(
+            plan, folder, readings_mT, twin_seed, control=control, speed=speed
+        ) as devices,
         pausing(control, keys=keys),
-        _watching(devices, live_port) as report,
+        _watching(devices, live_port, control) as report,
         progress(plan.model.name) as tell,
     ):
         _assume(devices, assume_gap_mm)
@@ -291,7 +304,9 @@ def _carry_out(
 
 
 @contextlib.contextmanager
-def _watching(devices: Devices, port: int | None) -> Iterator[Callable[[str], None]]:
+def _watching(
+    devices: Devices, port: int | None, control: RunControl
+) -> Iterator[Callable[[str], None]]:
     """Yield where the run reports to; with a port, a page in the browser too."""
     if port is None:
         yield _report
@@ -309,6 +324,7 @@ def _watching(devices: Devices, port: int | None) -> Iterator[Callable[[str], No
     now_s = devices.clock.monotonic_s
     with live_view(devices.camera, status, now_s, port=port) as address:
         _report(f"live view: {address}")
+        control.state.tell(live_view=address)
         yield report
 
 

@@ -14,7 +14,19 @@ from .bench.devices import (
     Devices as Devices,
 )
 from .bench.open import (
+    open_camera as open_camera,
+)
+from .bench.open import (
     open_devices as open_devices,
+)
+from .bench.open import (
+    open_meter as open_meter,
+)
+from .bench.open import (
+    open_stage as open_stage,
+)
+from .bench.template import (
+    write_templates as write_templates,
 )
 from .clock import (
     Clock as Clock,
@@ -51,6 +63,12 @@ from .ports import (
     list_ports as list_ports,
 )
 from .runs.control import RunControl as RunControl
+from .runs.dry_run import (
+    homing_s as homing_s,
+)
+from .runs.dry_run import (
+    plan_steps as plan_steps,
+)
 from .runs.read import (
     Run as Run,
 )

@@ -101,6 +101,14 @@ class TwinBench:
         Clearance between the rod's lower face and the paper.
     gravity_m_s2 : tuple of float
         Free fall (x, y, z) in the specimen frame; it needs the rod's density.
+
+    Attributes
+    ----------
+    shows_board : bool
+        Whether the calibration board lies under the camera in place of rod and clamp.
+    exposures : int or None
+        After so many pictures of a still scene they come round again, noise and all: a
+        live view costs no more. None makes every picture anew.
     """
 
     def __init__(
@@ -128,6 +136,10 @@ class TwinBench:
         span_mm = max(58.0, 1.6 * specimen.length_mm)
         self._camera = scene_camera(height_mm=330.0 * span_mm / 58.0, tilt_deg=1.5)
         self._painted: tuple[float, NDArray[np.float32]] | None = None
+        self._exposed: list[NDArray[np.uint8]] = []
+        self._turn = 0
+        self.shows_board = False
+        self.exposures: int | None = None
 
     def solution(self, gap_mm: float) -> Solution:
         """Return the true equilibrium at a gap."""
@@ -157,9 +169,17 @@ class TwinBench:
         Only the sensor's noise differs between two pictures of a still rod.
         """
         del time_s
+        if self.shows_board:
+            return self.photograph_board()
         if self._painted is None or self._painted[0] != gap_mm:
             self._painted = (gap_mm, paint_scene(self._scene(gap_mm), self._camera))
-        return expose(self._painted[1], _LIGHT, self._noise)
+            self._exposed = []
+        if self.exposures is not None and len(self._exposed) >= self.exposures:
+            self._turn = (self._turn + 1) % self.exposures
+            return self._exposed[self._turn]
+        picture = expose(self._painted[1], _LIGHT, self._noise)
+        self._exposed = [*self._exposed, picture] if self.exposures else []
+        return picture
 
     def photograph_board(self) -> NDArray[np.uint8]:
         """Return the same camera's picture of the calibration board on the paper."""

@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import json
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -36,7 +38,12 @@ _SWING = {"swing_mm": 1.0, "swing_Hz": 2.0, "damping_s": 0.4}
 
 
 def open_twin_bench(
-    plan: Plan, *, seed: int, clock: Clock, log: WireLog | None = None
+    plan: Plan,
+    *,
+    seed: int,
+    clock: Clock,
+    log: WireLog | None = None,
+    camera: Mapping[str, Any] | None = None,
 ) -> tuple[TwinBench, Devices]:
     """Open the twin bench of a plan: its specimen before its rig's magnet.
 
@@ -50,6 +57,8 @@ def open_twin_bench(
         Shared by all devices.
     log : WireLog, optional
         Where every byte to and from the board is recorded.
+    camera : mapping, optional
+        Options of the twin's camera besides the rod's swing, such as ``frame_s``.
 
     Raises
     ------
@@ -67,7 +76,7 @@ def open_twin_bench(
     )  # fmt: skip
     devices = open_twin(
         plan.rig, bench.photograph, bench.flux_mT,
-        seed=seed, clock=clock, log=log, camera=_SWING,
+        seed=seed, clock=clock, log=log, camera={**_SWING, **(camera or {})},
     )  # fmt: skip
     return bench, devices
 

@@ -127,7 +127,7 @@ def test_scan_field_fits_the_magnet(bench_folder: Path) -> None:
         (["rig", "run", "plan.toml", "--out", "x", "--flux-mT", "a"], 1, "numbers"),
         (["rig", "verify", "nowhere"], 1, "no such run folder"),
         (["rig", "verify"], 2, "Missing argument"),
-        (["rig", "run", "plan.toml", "--speed"], 2, "No such option"),
+        (["rig", "run", "plan.toml", "--hurry"], 2, "No such option"),
         (["rig", "init", "."], 1, "is not overwritten"),
         (["rig", "run", "plan.toml", "--out", "plan.toml/x"], 1, "plan.toml"),
     ],

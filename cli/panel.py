@@ -1,0 +1,67 @@
+"""``magbend panel``: the bench on one local page."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+
+import typer
+
+from ..core.errors import MissingExtraError
+
+EXAMPLE = "Example: magbend panel --rig rig.toml"
+
+
+def panel(
+    rig: Path = typer.Option(
+        Path("rig.toml"), "--rig", help="The rig file; the page helps to write one."
+    ),
+    port: int = typer.Option(8765, "--port", help="Port of the page; 0: any."),
+    host: str = typer.Option(
+        "127.0.0.1",
+        "--host",
+        help="Address to listen on; beyond this machine's own "
+        "loopback the page asks for a token.",
+    ),
+    name: list[str] = typer.Option(
+        [],
+        "--name",
+        help="A name by which browsers reach it, such as a TLS proxy's.",
+    ),
+    no_browser: bool = typer.Option(
+        False, "--no-browser", help="Print the address; open no browser."
+    ),
+    seed: int = typer.Option(1, "--seed", help="Which hidden truth the twin gets."),
+    speed: float = typer.Option(
+        1.0, "--speed", help="How many times as fast as the wall's the twin's clock is."
+    ),
+) -> None:
+    """Show the bench on a local page: live picture, theory over it, runs, set-up.
+
+    The page calls what the command line calls. A run belongs to its own process:
+    closing the page, or this command, does not stop it. Ctrl-C ends the panel.
+    """
+    open_panel(
+        rig, host=host, port=port, names=tuple(name), browser=not no_browser,
+        seed=seed, speed=speed,
+    )  # fmt: skip
+
+
+def open_panel(
+    rig: Path, *, port: int, host: str = "127.0.0.1", names: tuple[str, ...] = (),
+    browser: bool = True, seed: int = 1, speed: float = 1.0,
+) -> None:  # fmt: skip
+    """Serve the panel of a rig file until Ctrl-C."""
+    try:
+        from ..panel import Address, Panel, Twin, Workspace, serve
+    except ModuleNotFoundError as error:
+        raise MissingExtraError(
+            (error.name or "starlette").partition(".")[0], "panel", "the control panel"
+        ) from None
+    from ..analysis.warm_up import main as warm
+
+    address = Address(host=host, port=port, names=names)
+    warm(typer.echo)
+    with contextlib.suppress(KeyboardInterrupt):
+        panel = Panel(Workspace(rig), twin=Twin(seed=seed, speed=speed))
+        serve(panel, address, browser=browser, tell=typer.echo)

@@ -1,0 +1,18 @@
+from .bench.parts import (
+    Twin as Twin,
+)
+from .demo import (
+    prepare_demo as prepare_demo,
+)
+from .panel import (
+    Panel as Panel,
+)
+from .serve import (
+    Address as Address,
+)
+from .serve import (
+    serve as serve,
+)
+from .workspace import (
+    Workspace as Workspace,
+)

@@ -1,0 +1,210 @@
+"""What a page may ask for, by name; each is what a command of ``magbend`` does too."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import TimeoutError as StillGoing
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from ..core.checks import finite
+from ..core.errors import InputError, MagbendError, StageError
+from .bench.parts import Parts
+from .runs import actions as run_actions
+
+if TYPE_CHECKING:
+    from .panel import Panel
+
+Arguments = Mapping[str, Any]
+Outcome = dict[str, Any]
+
+ANSWER_S = 0.6
+"""A move that is refused is refused within this time; one that goes on is shown."""
+
+MOST_JOG_MM = 20.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Caller:
+    """The page that asks: its secret, and how it is named in the log."""
+
+    client: str
+    name: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Command:
+    """A command: what it does, and whether only the holder of the controls may ask."""
+
+    do: Callable[[Panel, Arguments], Outcome]
+    needs_controls: bool = True
+
+
+def carry_out(panel: Panel, caller: Caller, name: str, arguments: Arguments) -> Outcome:
+    """Do what a page asks, and log it with its source.
+
+    Raises
+    ------
+    NotYoursError
+        If another page holds the controls.
+    MagbendError
+        If it is refused or fails.
+    """
+    command = COMMANDS[name]
+    try:
+        if name in ("take", "release"):
+            outcome = _controls(panel, caller, name, arguments)
+        else:
+            if command.needs_controls:
+                panel.controls.require(caller.client, caller.name)
+            outcome = command.do(panel, arguments)
+    except MagbendError as error:
+        panel.journal.write(caller.name, name, arguments, f"refused: {error}")
+        raise
+    finally:
+        panel.hub.changed()
+    panel.journal.write(caller.name, name, arguments, str(outcome.get("text", "done")))
+    return {"ok": True, **outcome}
+
+
+def _controls(panel: Panel, caller: Caller, name: str, arguments: Arguments) -> Outcome:
+    if name == "release":
+        panel.controls.release(caller.client)
+        return {"text": "the controls are free"}
+    over = arguments.get("over") is True
+    before = panel.controls.take(caller.client, caller.name, over=over)
+    return {"text": f"taken over from {before.name}" if before else "taken"}
+
+
+def _stop(panel: Panel, _arguments: Arguments) -> Outcome:
+    """Stop whatever moves: the run, else the stage."""
+    if panel.supervisor.facts is not None:
+        return {"text": panel.supervisor.ask("stop")}
+    panel.owner.request_stop()
+    return {"text": "stopping"}
+
+
+def _connect(panel: Panel, _arguments: Arguments) -> Outcome:
+    _refuse_during_run(panel)
+    panel.owner.release()
+    panel.sight.forget()
+    return _wait(panel.owner.open(), "connecting")
+
+
+def _home(panel: Panel, _arguments: Arguments) -> Outcome:
+    _refuse_during_run(panel)
+    return _wait(
+        panel.owner.submit("homing", lambda parts: _stage(parts).home()), "homing"
+    )
+
+
+def _goto(panel: Panel, arguments: Arguments) -> Outcome:
+    _refuse_during_run(panel)
+    gap_mm = number(arguments, "gap_mm", "mm")
+    return _go(panel, lambda _here_mm: gap_mm, gap_mm)
+
+
+def _jog(panel: Panel, arguments: Arguments) -> Outcome:
+    _refuse_during_run(panel)
+    step_mm = number(arguments, "step_mm", "mm")
+    if not 0.0 < abs(step_mm) <= MOST_JOG_MM:
+        raise InputError(
+            f"a jog must be up to {MOST_JOG_MM:g} mm and not zero; instead received "
+            f"{step_mm:g} mm: go to a gap for more"
+        )
+    here_mm = panel.owner.gap_mm
+    target_mm = None if here_mm is None else here_mm + step_mm
+    return _go(panel, lambda here: here + step_mm, target_mm)
+
+
+def _go(
+    panel: Panel, target: Callable[[float], float], target_mm: float | None
+) -> Outcome:
+    def act(parts: Parts) -> None:
+        stage = _stage(parts)
+        here_mm = stage.status().gap_mm
+        if here_mm is None:
+            raise StageError("the gap is not known; home the stage first")
+        gap_mm = target(here_mm)
+        stage.check_gap(gap_mm)
+        stage.goto_gap(gap_mm, moved=panel.owner.moved)
+
+    what = "jogging" if target_mm is None else f"going to {target_mm:.3f} mm"
+    return _wait(panel.owner.submit(what, act, target_mm=target_mm), what)
+
+
+def _recover(panel: Panel, _arguments: Arguments) -> Outcome:
+    _refuse_during_run(panel)
+    return _wait(
+        panel.owner.submit("recovering", lambda parts: _stage(parts).recover()),
+        "recovering",
+    )
+
+
+def _unlock(panel: Panel, arguments: Arguments) -> Outcome:
+    _refuse_during_run(panel)
+    sure = arguments.get("confirm") is True
+    return _wait(
+        panel.owner.submit(
+            "unlocking", lambda parts: _stage(parts).unlock(confirm=sure)
+        ),
+        "unlocking",
+    )
+
+
+def _stage(parts: Parts) -> Any:
+    if parts.stage is None:
+        raise StageError(parts.problems.get("stage", "the stage is not connected"))
+    return parts.stage
+
+
+def _refuse_during_run(panel: Panel) -> None:
+    if panel.supervisor.is_running:
+        raise StageError(
+            "a run has the bench; wait for its end, or abort it on the page Run"
+        )
+
+
+def _wait(future: Any, what: str) -> Outcome:
+    """Return at once what is refused at once; a motion goes on by itself."""
+    try:
+        future.result(timeout=ANSWER_S)
+    except StillGoing:
+        return {"text": what, "going": True}
+    return {"text": f"{what}: done"}
+
+
+def number(arguments: Arguments, name: str, unit: str) -> float:
+    """Return a number of the arguments.
+
+    Raises
+    ------
+    InputError
+        If it is missing or not finite.
+    """
+    value = arguments.get(name)
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise InputError(
+            f"{name} must be a number in {unit}; instead received {value!r}"
+        )
+    return finite(value, name, unit)
+
+
+COMMANDS: dict[str, Command] = {
+    "take": Command(do=lambda _panel, _arguments: {}, needs_controls=False),
+    "release": Command(do=lambda _panel, _arguments: {}, needs_controls=False),
+    "stop": Command(do=_stop, needs_controls=False),
+    "connect": Command(do=_connect),
+    "home": Command(do=_home),
+    "goto": Command(do=_goto),
+    "jog": Command(do=_jog),
+    "recover": Command(do=_recover),
+    "unlock": Command(do=_unlock),
+    "plan-save": Command(do=run_actions.save_plan),
+    "run-start": Command(do=run_actions.start_run),
+    "run-pause": Command(do=run_actions.pause_run),
+    "run-resume": Command(do=run_actions.resume_run),
+    "run-abort": Command(do=run_actions.abort_run, needs_controls=False),
+    "job": Command(do=run_actions.start_job),
+}
+"""Every command by its name in the address of a POST."""

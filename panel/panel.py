@@ -1,0 +1,160 @@
+"""The panel: one bench, its owner thread, its eye, its runs, and who may command."""
+
+from __future__ import annotations
+
+import threading
+import time
+from datetime import UTC, datetime
+from typing import Any
+
+from ..core.errors import CameraError, MagbendError
+from .bench.field import FieldWatch
+from .bench.owner import BenchOwner
+from .bench.parts import Parts, Twin, is_twin, open_parts
+from .bench.sight import Picture, Sight
+from .bench.theory import Place, overlay, predict
+from .controls import Controls
+from .hub import Hub
+from .journal import Journal
+from .runs.jobs import Jobs
+from .runs.supervisor import Supervisor
+from .state import compose
+from .workspace import Workspace
+
+
+def utc_now() -> str:
+    """Return the time of day in UTC, to the second."""
+    return datetime.now(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
+
+
+class Panel:
+    """Everything behind the page; `serve` gives it an address.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        The files of the bench.
+    twin : Twin, optional
+        How the computed bench is opened, if the rig file names it.
+    """
+
+    def __init__(self, workspace: Workspace, *, twin: Twin | None = None) -> None:
+        self.workspace = workspace
+        self.twin = twin or Twin()
+        self.controls = Controls(utc_now)
+        self.journal = Journal(workspace.folder, utc_now)
+        self.hub = Hub(lambda: compose(self), self.controls)
+        self.owner = BenchOwner(
+            lambda: open_parts(
+                workspace, self.twin, stop=lambda: self.owner.request_stop()
+            ),
+            self.hub.changed,
+            lambda: self.hub.is_watched,
+        )
+        self.sight = Sight(
+            self._grab, self._measure, self._pace_s, self.hub.show, self.hub.draw
+        )
+        self.field = FieldWatch(self)
+        self.supervisor = Supervisor(workspace, self.hub.changed)
+        self.jobs = Jobs(workspace, self.hub.changed)
+        self._number = 0
+        self._after_s = 0.0
+        self._follow: Any = None
+        self._pose: Any = None
+        self._begun = threading.Event()
+
+    def begin(self) -> None:
+        """Start the threads and open the bench, if there is a rig file."""
+        self._begun.set()
+        self.owner.begin()
+        self.sight.begin()
+        self.field.begin()
+        self.supervisor.begin()
+        self.connect()
+
+    def connect(self) -> None:
+        """Open the bench, unless there is no rig file or a run has it."""
+        if self.workspace.files().rig is not None and not self.supervisor.is_running:
+            self.owner.open()
+
+    def close(self) -> None:
+        """Hold and let go of the bench; a run goes on in its own process."""
+        if self._begun.is_set():
+            self.supervisor.close()
+            self.sight.close()
+            self.field.close()
+            self.owner.close()
+            self.jobs.close()
+
+    @property
+    def is_twin(self) -> bool:
+        """Whether the bench is the computed one."""
+        return is_twin(self.workspace)
+
+    def _pace_s(self) -> float:
+        is_moving = bool(self.owner.view().doing) or self.supervisor.is_running
+        return self.hub.pace_s(is_moving=is_moving)
+
+    def _grab(self) -> Picture | None:
+        if self.supervisor.is_running:
+            return self.supervisor.picture()
+        parts = self.owner.parts
+        if parts is None:
+            return None
+        if parts.camera is None:
+            if "camera" in parts.problems:
+                raise CameraError(parts.problems["camera"])
+            return None
+        return self._grab_here(parts)
+
+    def _grab_here(self, parts: Parts) -> Picture:
+        frame = parts.camera.grab_after(self._after_s)
+        self._after_s = frame.arrival_s
+        self._number += 1
+        return Picture(
+            image=frame.image, number=self._number, arrival_s=time.monotonic(),
+            gap_mm=self.owner.gap_mm,
+        )  # fmt: skip
+
+    def _measure(self, picture: Picture) -> dict[str, Any]:
+        from ..vision import Setting, as_photo, measure
+
+        files = self.workspace.files()
+        calibration = files.calibration
+        size = picture.image.shape[1::-1]
+        if calibration is not None and tuple(calibration.image_size_px) != tuple(size):
+            calibration = None
+        rod = files.specimen
+        setting = Setting(
+            calibration=calibration,
+            joints_mm=rod.joints_mm if rod else (),
+            length_mm=rod.length_mm if rod else None,
+        )
+        measured = measure(as_photo(picture.image), setting)
+        if measured.pose is not None:
+            self._pose = measured.pose
+        predicted: dict[str, Any] = {}
+        if picture.gap_mm is not None:
+            place = Place(
+                gap_mm=picture.gap_mm, flux_mT=self.field.flux_mT_at(picture.gap_mm)
+            )
+            predicted = predict(files, place)
+        drawn = overlay(measured, calibration, predicted, self._pose)
+        return {
+            **drawn, "gap_mm": picture.gap_mm, "calibrated": calibration is not None
+        }  # fmt: skip
+
+    def snapshot(self) -> Picture:
+        """Return the newest live picture.
+
+        Raises
+        ------
+        MagbendError
+            If there is none.
+        """
+        picture = self.sight.newest()
+        if picture is None:
+            raise MagbendError(
+                "there is no live picture; look at the camera, and keep the page open"
+            )
+        return picture

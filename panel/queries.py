@@ -1,0 +1,82 @@
+"""What a page may look at, by name: nothing here changes anything."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..core.errors import InputError, MagbendError, StoreError
+from .bench.sight import pack
+from .runs.listing import list_runs, run_detail
+from .runs.plan_file import check_plan, plan_values
+from .workspace import require
+
+if TYPE_CHECKING:
+    from .panel import Panel
+
+Query = Mapping[str, str]
+SERVED = {".png", ".jpg", ".jpeg", ".html", ".pdf", ".svg", ".csv", ".json", ".toml"}
+"""What of a run folder is shown."""
+
+_WIDEST_PX = 1600
+
+
+def _plan(panel: Panel, query: Query) -> Any:
+    """Return the plan's values, or what the given values would do."""
+    files = panel.workspace.files()
+    if "values" not in query:
+        plan = require(files.plan, files.problems, "plan")
+        return {"values": plan_values(plan)}
+    try:
+        values = json.loads(query["values"])
+    except ValueError:
+        raise InputError("the plan's values must be JSON") from None
+    if not isinstance(values, dict):
+        raise InputError("the plan's values must be one JSON object")
+    return check_plan(panel.workspace, values)
+
+
+def _picture(panel: Panel, _query: Query) -> bytes:
+    return pack(panel.snapshot()).jpeg
+
+
+def run_file(panel: Panel, run: str, path: str, width: str) -> Path | bytes:
+    """Return a file of a run folder, or a small JPEG of a photograph in it.
+
+    Raises
+    ------
+    InputError, StoreError
+        If there is no such run, or no such file that may be shown.
+    """
+    folder = panel.workspace.run_path(run).resolve()
+    found = (folder / path).resolve()
+    is_inside = folder in found.parents and found.suffix.lower() in SERVED
+    if not is_inside or not found.is_file():
+        raise StoreError(f"the run {run} has no file {path!r} to show")
+    if not width:
+        return found
+    if not width.isdigit() or not 16 <= int(width) <= _WIDEST_PX:
+        raise InputError(f"width must be from 16 to {_WIDEST_PX} px")
+    return _small(found, int(width))
+
+
+def _small(path: Path, width: int) -> bytes:
+    import cv2
+
+    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    if image is None:
+        raise MagbendError(f"{path.name} is no picture")
+    height = max(1, round(image.shape[0] * width / image.shape[1]))
+    small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+    return bytes(cv2.imencode(".jpg", small)[1].tobytes())
+
+
+QUERIES: dict[str, Callable[[Panel, Query], Any]] = {
+    "plan": _plan,
+    "picture": _picture,
+    "runs": lambda panel, _query: list_runs(panel.workspace),
+    "run": lambda panel, query: run_detail(panel.workspace, query.get("name", "")),
+}
+"""Every query by its name in the address of a GET."""

@@ -1,0 +1,85 @@
+"""What every open page is told: the state of files, bench, field, run and jobs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .panel import Panel
+
+
+def compose(panel: Panel) -> dict[str, Any]:
+    """Return the state that all pages share."""
+    return {
+        "files": _files(panel),
+        "bench": _bench(panel),
+        "camera": panel.sight.facts(),
+        "meter": panel.field.facts(),
+        "run": _run(panel),
+        "jobs": panel.jobs.facts(),
+        "pages": len(panel.hub.pages),
+        "journal": panel.journal.trouble,
+    }
+
+
+def _files(panel: Panel) -> dict[str, Any]:
+    files = panel.workspace.files()
+    rig, specimen, calibration = files.rig, files.specimen, files.calibration
+    return {
+        "folder": str(panel.workspace.folder),
+        "rig_file": panel.workspace.rig_path.name,
+        "has_rig_file": panel.workspace.rig_path.exists(),
+        "rig": rig.name if rig else None,
+        "twin": panel.is_twin,
+        "specimen": {
+            "name": specimen.name,
+            "length_mm": specimen.length_mm,
+            "joints_mm": list(specimen.joints_mm),
+        }
+        if specimen
+        else None,
+        "plan": files.plan.model.name if files.plan else None,
+        "calibration": {
+            "rms_px": calibration.rms_px,
+            "size_px": list(calibration.image_size_px),
+            "rod_height_mm": calibration.rod_height_mm,
+            "tilt_deg": calibration.tilt_deg,
+        }
+        if calibration
+        else None,
+        "fitted": files.fitted.run if files.fitted else None,
+        "problems": files.problems,
+    }
+
+
+def _bench(panel: Panel) -> dict[str, Any]:
+    view = panel.owner.view()
+    parts = panel.owner.parts
+    rig = panel.workspace.files().rig
+    limits: dict[str, Any] = {}
+    if rig is not None:
+        limits = {
+            "min_gap_mm": rig.limits.min_gap_mm,
+            "max_gap_mm": rig.limits.max_gap_mm,
+            "contact_gap_mm": rig.limits.contact_gap_mm,
+            "magnet_mm": rig.magnet.magnet().sides_mm[2] if rig.magnet else None,
+            "homing": rig.stage.homing,
+        }
+    return {
+        "open": parts is not None,
+        "facts": view.facts,
+        "doing": view.doing,
+        "target_mm": view.target_mm,
+        "trouble": view.trouble,
+        "problems": parts.problems if parts else {},
+        **limits,
+    }
+
+
+def _run(panel: Panel) -> dict[str, Any]:
+    supervisor = panel.supervisor
+    return {
+        "facts": supervisor.facts,
+        "starting": supervisor.is_starting and supervisor.facts is None,
+        "last": supervisor.last_run,
+    }
