@@ -3,6 +3,7 @@
 # make check   lint, format and type checks, and the import contract
 # make docs    build the site into docs/site (the tests of this are in .ci/run)
 # make mutants  break a few places at random and see whether the tests notice (COUNT=12 SEED=...)
+# make release VERSION=0.2.0   changelog, hashed pins, wheel and sdist, checked and tried
 # make clean   remove .venv and build products
 
 PYTHON ?= python3
@@ -11,7 +12,7 @@ OUT    ?= demo
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test check docs mutants clean
+.PHONY: demo test check docs mutants release clean
 .DEFAULT_GOAL := demo
 
 demo: $(VENV)/.ready
@@ -36,6 +37,10 @@ docs: $(VENV)/.ready-test
 mutants: $(VENV)/.ready-test
 	$(BIN)/python tests/mutants.py --count $(or $(COUNT),12) $(if $(SEED),--seed $(SEED))
 
+release: $(VENV)/.ready-test
+	$(PIP) --constraint constraints.txt build twine pip-tools
+	$(BIN)/python .ci/release.py $(VERSION)
+
 $(VENV)/.created:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "magbend needs Python 3.11 or newer; found $$($(PYTHON) --version). Name another one: make PYTHON=python3.12"; exit 1; }
@@ -55,4 +60,4 @@ $(VENV)/.ready-test: $(VENV)/.created pyproject.toml constraints.txt
 	touch $@ $(VENV)/.ready
 
 clean:
-	rm -rf $(VENV) build
+	rm -rf $(VENV) build dist docs/made docs/site

@@ -10,6 +10,11 @@ from .console import print_json
 
 DEMO_EXAMPLE = "Example: magbend demo --out demo"
 DOCTOR_EXAMPLE = "Example: magbend doctor --json"
+EXAMPLES_EXAMPLE = "Example: magbend examples --out magbend-examples"
+SCHEMA_EXAMPLE = (
+    "Example: magbend schema --out schemas; then write '#:schema "
+    "schemas/plan.schema.json' into the first line of plan.toml"
+)
 
 
 def demo(
@@ -46,3 +51,31 @@ def doctor(
             )
     if any(finding.status == "broken" for finding in findings):
         raise typer.Exit(1)
+
+
+def examples(
+    out: Path = typer.Option(Path("magbend-examples"), "--out", help="Folder to fill."),
+) -> None:
+    """Copy the examples that come with the package: scripts, plans, rods, a library."""
+    from ..analysis.examples import copy_examples
+
+    for path in copy_examples(out):
+        typer.echo(str(path))
+
+
+def schema(
+    kind: str = typer.Argument(
+        "", help="specimen, magnet, rig, plan, meter, space or makeable."
+    ),
+    out: Path | None = typer.Option(
+        None, "--out", help="Write every schema into this folder."
+    ),
+) -> None:
+    """Print the JSON Schema of a TOML file, for editors that check while one types."""
+    from ..analysis.schemas import toml_schema, write_toml_schemas
+
+    if out is not None:
+        for path in write_toml_schemas(out):
+            typer.echo(str(path))
+        return
+    print_json(toml_schema(kind))

@@ -11,12 +11,10 @@ from .console import JSON, group, print_json, progress
 app = group(
     "library",
     "Build and search the prediction library.",
-    "magbend analysis library build fixtures/library/million.toml --out million",
+    "magbend analysis library build million.toml --out million",
 )
 
-BUILD_EXAMPLE = (
-    "Example: magbend analysis library build fixtures/library/million.toml --out DIR"
-)
+BUILD_EXAMPLE = "Example: magbend analysis library build million.toml --out DIR"
 QUERY_EXAMPLE = (
     'Example: magbend analysis library query DIR --where "tip_y_mm > 4 and side_mm < 1"'
     " --sort=-circularity --top 10 --out best.csv"

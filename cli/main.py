@@ -26,6 +26,8 @@ app.add_typer(analysis.app, name="analysis")
 app.command("demo", epilog=bench.DEMO_EXAMPLE)(bench.demo)
 app.command("panel", epilog=panel.EXAMPLE)(panel.panel)
 app.command("doctor", epilog=bench.DOCTOR_EXAMPLE)(bench.doctor)
+app.command("examples", epilog=bench.EXAMPLES_EXAMPLE)(bench.examples)
+app.command("schema", epilog=bench.SCHEMA_EXAMPLE)(bench.schema)
 
 
 def _print_version(wanted: bool) -> None:

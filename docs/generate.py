@@ -94,7 +94,7 @@ def gallery(folder: Path) -> str:
     examples = Path(__file__).resolve().parents[1] / "examples"
     sys.path.insert(0, str(examples))
     lines = ["# Gallery", "", "Each figure is drawn by the script above it.", ""]
-    for script in sorted(examples.glob("*.py")):
+    for script in sorted(examples.glob("[!_]*.py")):
         module: Any = import_module(script.stem)
         if not hasattr(module, "main"):
             continue

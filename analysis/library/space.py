@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, ConfigDict, Field, PlainSerializer
+from pydantic import BeforeValidator, ConfigDict, Field, PlainSerializer, WithJsonSchema
 
 from ...core.errors import ConfigError
 from ...core.specimen_file import MagnetModel
@@ -105,11 +105,32 @@ def _positive_axis(axis: Axis) -> Axis:
     return axis
 
 
-AnyAxis = Annotated[Axis, BeforeValidator(_parse_axis), PlainSerializer(_axis_dict)]
+_AS_TYPED = WithJsonSchema(
+    {
+        "anyOf": [
+            {"type": "number"},
+            {"type": "array", "items": {"type": "number"}, "minItems": 1},
+            {
+                "type": "object",
+                "properties": {
+                    "from": {"type": "number"},
+                    "to": {"type": "number"},
+                    "count": {"type": "integer", "minimum": 1},
+                },
+                "required": ["from", "to"],
+                "additionalProperties": False,
+            },
+        ]
+    }
+)
+AnyAxis = Annotated[
+    Axis, BeforeValidator(_parse_axis), PlainSerializer(_axis_dict), _AS_TYPED
+]
 PositiveAxis = Annotated[
     Axis,
     BeforeValidator(lambda value: _positive_axis(_parse_axis(value))),
     PlainSerializer(_axis_dict),
+    _AS_TYPED,
 ]
 ONE_ANGLE = Axis(values=(90.0,), low=90.0, high=90.0)
 

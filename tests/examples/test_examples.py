@@ -36,7 +36,7 @@ def example(name: str) -> ModuleType:
 
 
 def test_every_example_is_listed_and_tested() -> None:
-    names = {path.stem for path in EXAMPLES.glob("*.py")}
+    names = {path.stem for path in EXAMPLES.glob("[!_]*.py")}
     listed = (EXAMPLES / "README.md").read_text(encoding="utf-8")
     here = Path(__file__).read_text(encoding="utf-8")
     for name in names:

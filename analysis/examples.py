@@ -1,0 +1,44 @@
+"""The examples and input files that come with the package, copied to a folder."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+
+from ..core.errors import StoreError
+from ..core.files import write_text
+
+FOLDERS = {
+    "magbend.examples": "",
+    "magbend.examples.plans": "plans",
+    "magbend.examples.specimens": "specimens",
+    "magbend.examples.library": "library",
+}
+KINDS = (".py", ".md", ".toml", ".csv", ".ipynb")
+
+
+def copy_examples(folder: Path) -> list[Path]:
+    """Copy scripts and input files; return where they lie.
+
+    Parameters
+    ----------
+    folder : Path
+        Where to; it is made. What is there already stays as it is.
+
+    Raises
+    ------
+    StoreError
+        If one of the files exists already.
+    """
+    copies = {}
+    for package, inside in FOLDERS.items():
+        for entry in resources.files(package).iterdir():
+            if entry.name.endswith(KINDS) and entry.name != "__init__.py":
+                copies[folder / inside / entry.name] = entry.read_text("utf-8")
+    for path in sorted(copies):
+        if path.exists():
+            raise StoreError(f"{path} is there already; name another folder")
+    for path, text in copies.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_text(path, text)
+    return sorted(copies)
