@@ -49,6 +49,9 @@ from .imports.door import (
 from .imports.door import (
     read_shapes as read_shapes,
 )
+from .imports.finish import (
+    report_imported as report_imported,
+)
 from .imports.judge import (
     Reading as Reading,
 )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from ..core.errors import InputError
-from .console import JSON, print_json
+from .console import JSON, print_json, progress
 
 if TYPE_CHECKING:
     from ..analysis.imports.run import ImportedRun
@@ -52,11 +52,17 @@ def import_(
     angles: str = ANGLES,
     flip: bool = FLIP,
     align: bool = ALIGN,
+    report: bool = typer.Option(
+        False, "--report", help="Also measure the photographs, compare and report."
+    ),
+    rod_height_mm: float = typer.Option(
+        None, "--rod-height-mm", help="With --report: as for vision extract."
+    ),
     name: str = typer.Option("", "--name", help="Of the run; the table's if empty."),
     json: bool = JSON,
 ) -> None:
     """Make a run of a table of photographs or shapes, with gaps and readings."""
-    from ..analysis import Reading, import_table, write_template
+    from ..analysis import Reading, import_table, report_imported, write_template
 
     if table.is_dir():
         _template(write_template(table), as_json=json)
@@ -74,10 +80,17 @@ def import_(
         ),
         name=name,
     )
+    page = ""
+    if report:
+        html = (done[0].path if len(done) == 1 else out) / "report.html"
+        with progress("report", kept=f"{out} holds what was imported") as tell:
+            page = str(
+                report_imported(done, html, rod_height_mm=rod_height_mm, progress=tell)
+            )
     if json:
-        print_json([_as_dict(run) for run in done])
+        print_json({"runs": [_as_dict(run) for run in done], "html": page or None})
     else:
-        _tell(done, out, calibration)
+        _tell(done, out, calibration, page)
 
 
 def _as_dict(run: ImportedRun) -> dict[str, Any]:
@@ -90,7 +103,9 @@ def _as_dict(run: ImportedRun) -> dict[str, Any]:
     }
 
 
-def _tell(done: list[ImportedRun], out: Path, calibration: Path | None) -> None:
+def _tell(
+    done: list[ImportedRun], out: Path, calibration: Path | None, page: str
+) -> None:
     for run in done:
         for note in run.notes:
             typer.echo(f"note: {note}", err=True)
@@ -98,6 +113,9 @@ def _tell(done: list[ImportedRun], out: Path, calibration: Path | None) -> None:
             f"{run.path}: {run.steps} steps, {run.centrelines} centrelines, "
             f"{run.simulated} simulated shapes"
         )
+    if page:
+        typer.echo(page)
+        return
     if all(run.centrelines for run in done):
         typer.echo(f"next: magbend analysis report {out}")
         return

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from .analysis_import import ALIGN, FLIP, UNIT
 from .console import JSON, print_json
 
 if TYPE_CHECKING:
+    from ..analysis import Reading
     from ..analysis.design.goals import Goal
     from ..analysis.design.makeable import Makeable
     from ..analysis.design.search import Design
@@ -29,8 +31,11 @@ def design(
         None, "--tip-angle-deg", "--angle-deg", help="Wanted tangent angle at the tip."
     ),
     curve: Path | None = typer.Option(
-        None, "--curve", help="Wanted curve: CSV with x_mm,y_mm from the clamp on."
+        None, "--curve", help="Wanted curve from the clamp on: CSV, DXF, SVG, ..."
     ),
+    unit: str = UNIT,
+    flip: bool = FLIP,
+    align: bool = ALIGN,
     polyline: Path | None = typer.Option(
         None, "--polyline", help="Curve drawn on a photograph: CSV with x_px,y_px."
     ),
@@ -78,6 +83,7 @@ def design(
     as_json: bool = JSON,
 ) -> None:
     """Find distinct rods that give a wanted shape, ranked by error and tolerance."""
+    from ..analysis import Reading
     from ..analysis.design import search as designing
     from ..analysis.surrogate import figures as model_figures
     from ..core.files import output_folder
@@ -85,8 +91,9 @@ def design(
     if figure is not None:
         model_figures.check_path(figure)
     goal = _goal(
-        radius_mm, tip_mm, tip_angle_deg, curve, polyline, calibration, rod_height_mm
-    )
+        radius_mm, tip_mm, tip_angle_deg, curve, polyline, calibration, rod_height_mm,
+        Reading(unit=unit, flip=flip, align=align),
+    )  # fmt: skip
     field = _field(flux_mT, field_angle_deg, magnet, gap_mm)
     options: dict[str, object] = {
         "total_length_mm": _range(length_mm, "--length-mm"),
@@ -120,7 +127,9 @@ def _goal(
     polyline: Path | None,
     calibration: Path | None,
     rod_height_mm: float,
+    how: Reading,
 ) -> Goal:
+    from ..analysis import read_shape
     from ..analysis.design import goals
     from ..core.errors import InputError
 
@@ -137,7 +146,7 @@ def _goal(
     if tip_angle_deg is not None:
         return goals.angle_goal(tip_angle_deg)
     if curve is not None:
-        return goals.curve_goal(goals.read_points(curve, ("x_mm", "y_mm")))
+        return goals.curve_goal(read_shape(str(curve), Path(), how).line.points_mm)
     if polyline is None or calibration is None:
         raise InputError("--polyline needs the --calibration of its photograph")
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import typer
 
+from .analysis_import import ALIGN, FLIP, UNIT
 from .console import JSON, group, print_json, progress
 
 app = group(
@@ -58,8 +59,11 @@ def query(
     where: str | None = typer.Option(None, "--where", help="Condition on columns."),
     ranges: list[str] = typer.Option([], "--range", help="KEY=LOW:HIGH, repeatable."),
     nearest: Path | None = typer.Option(
-        None, "--nearest", help="A shape.csv; rank by distance from it."
+        None, "--nearest", help="A file with a shape; rank by distance from it."
     ),
+    unit: str = UNIT,
+    flip: bool = FLIP,
+    align: bool = ALIGN,
     sort: str | None = typer.Option(
         None, "--sort", help="Column to rank by; --sort=-COLUMN for falling."
     ),
@@ -68,11 +72,14 @@ def query(
     as_json: bool = JSON,
 ) -> None:
     """Search a library: conditions, nearest shape, sort, the best few."""
+    from ..analysis import Reading, read_shape
     from ..analysis.library import query as searching
-    from ..core.centreline import Centreline
     from ..core.files import output_file
 
-    shape = None if nearest is None else Centreline.from_csv(nearest)
+    shape = None
+    if nearest is not None:
+        how = Reading(unit=unit, flip=flip, align=align)
+        shape = read_shape(str(nearest), Path(), how).line
     if out is not None:
         output_file(out)
     found = searching.query(

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import typer
 
+from .analysis_import import ALIGN, FLIP, UNIT
 from .console import JSON, group, print_json, progress
 
 app = group(
@@ -112,15 +113,33 @@ def fit(
     epilog="Example: magbend analysis surrogate correct comsol_*.txt --out fem.json"
 )
 def correct(
-    tables: list[Path] = typer.Argument(..., help="Text exports with % header lines."),
+    tables: list[Path] = typer.Argument(
+        ..., help="Files of shapes: COMSOL or other text, CSV, MATLAB, Mathematica."
+    ),
     out: Path = typer.Option(..., "--out", help="Correction file (.json)."),
+    specimen: Path = typer.Option(
+        None, "--specimen", help="The rod, where the files do not describe it."
+    ),
+    flux: str = typer.Option(
+        "", "--flux", help="Which parameter is the flux density, and its unit: B0=T."
+    ),
+    unit: str = UNIT,
+    flip: bool = FLIP,
+    align: bool = ALIGN,
     as_json: bool = JSON,
 ) -> None:
     """Learn from finite-element or COMSOL tables what the rod misses."""
+    from ..analysis import Reading
     from ..analysis.surrogate import tables as surrogate_tables
     from ..core.files import output_file
+    from ..core.specimen_file import read_specimen
 
-    cases = surrogate_tables.read_tables(tables)
+    cases = surrogate_tables.read_tables(
+        tables,
+        how=Reading(unit=unit, flip=flip, align=align),
+        specimen=read_specimen(specimen) if specimen else None,
+        flux=flux,
+    )
     output_file(out)
     learnt = surrogate_tables.fit_correction(cases)
     surrogate_tables.save_correction(learnt, out)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -33,11 +34,15 @@ def read_text_shapes(path: Path) -> list[Block]:
             "export it again with the data format Spreadsheet"
         )
     table = parse_table(text, path, needs_heads=False)
-    unit = ""
+    unit, parameters = "", {}
     for comment in table.comments:
         told = re.fullmatch(r"[Ll]ength unit:\s*(\S+)", comment)
         unit = told.group(1) if told else unit
-    return [table_block(table, unit)]
+        name, _, value = (part.strip() for part in comment.partition("="))
+        number = parse_number(value)
+        if name.isidentifier() and number is not None:
+            parameters[name] = number
+    return [replace(table_block(table, unit), parameters=parameters)]
 
 
 def table_block(table: Table, unit: str = "") -> Block:

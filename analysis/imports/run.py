@@ -51,6 +51,8 @@ class ImportedRun:
     ----------
     path : Path
         The run folder.
+    specimen : Specimen
+        Its rod.
     steps, centrelines, simulated : int
         Rows, measured shapes and simulated shapes.
     notes : tuple of str
@@ -58,6 +60,7 @@ class ImportedRun:
     """
 
     path: Path
+    specimen: Specimen
     steps: int
     centrelines: int
     simulated: int
@@ -169,6 +172,7 @@ def _write(
     folder.finish("success", f"imported from {table.name}")
     return ImportedRun(
         path=out,
+        specimen=job.specimen,
         steps=len(job.rows),
         centrelines=len(job.measured),
         simulated=len(job.simulated),
@@ -299,7 +303,10 @@ def _commit(
             target = f"{SOURCES}/{below.as_posix()}"
             output_folder((folder.path / target).parent)
             files[target] = read_bytes(path)
-    flags = [note for held in shapes if index in held for note in held[index].notes]
+    measured, simulated = (
+        held[index].notes if index in held else () for held in shapes
+    )
+    flags = {*measured, *(f"simulated_{note}" for note in simulated)}
     folder.commit_step(
         {
             "index": index,
@@ -309,7 +316,7 @@ def _commit(
             "flux_status": "none" if math.isnan(row.flux_mT) else "ok",
             "image": image,
             "time_utc": utc_now(),
-            "flags": sorted(set(flags)),
+            "flags": sorted(flags),
             "simulated": row.simulated,
             "columns": row.others,
         },

@@ -77,11 +77,14 @@ class Block:
         The head as written; values are numbers, or texts where they are none.
     unit : str
         Length unit that the file states for columns without one; empty if none.
+    parameters : mapping of str to float
+        What the file says of all its shapes, as ``% side_mm = 1.0``.
     """
 
     source: str
     columns: Sequence[tuple[str, Array | list[str]]]
     unit: str = ""
+    parameters: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,7 +190,8 @@ def _of_case(
         source=block.source, points=np.column_stack([x, y]), unit=unit,
         s=numbers("s"), theta=numbers("theta"),
         theta_unit=heads[at["theta"]].unit if "theta" in at else "", kappa=kappa,
-        material=material, parameters=case_parameters(case), kept=kept,
+        material=material, kept=kept,
+        parameters={**block.parameters, **case_parameters(case)},
     )  # fmt: skip
     return _by_parameters(whole, block, heads)
 

@@ -6,35 +6,44 @@ share of the length s / L and in how far the rod is bent, theta_rod(L). Its coef
 come from the positions by linear least squares; how many are worth having is decided by
 leaving out one case at a time, and what is left out also gives the error bar.
 
-A table is the text export of such programs: lines of numbers, and ``%`` lines before
-them. The last ``%`` line names the columns (``s_mm x_mm y_mm``, or with units in
-brackets, ``x (mm)``); a ``% key = value`` line gives a parameter of the whole file.
-Parameters are those of a specimen and a field: length1_mm, E1_MPa, ..., side_mm,
-remanence_mT, flux_mT, and angle_deg (90 without). Rows with the same parameters are one
-case.
+A file is any that `analysis.imports` reads. Parameters are those of a specimen and a
+field: length1_mm, E1_MPa, ..., side_mm, remanence_mT, flux_mT, and angle_deg (90
+without); they stand in columns, in heads (``y (m) @ B0=0.05``) or in lines
+``% side_mm = 1.0``, or come from a specimen file. Shapes with other parameters are
+other cases.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.columns import parse_number
+from ...core.columns import split_unit
 from ...core.errors import ConfigError, InputError, StoreError
 from ...core.files import write_text
-from ...core.table import Table, read_table
+from ...core.specimen import Specimen
+from ...core.units import unit_factor
 from ...sim.batch.shapes import Designs, solve_shapes
+from ..imports.door import read_raw_shapes
+from ..imports.judge import Reading, judged
+from ..imports.shapes import RawShape
 
 Array = NDArray[np.float64]
 
 POINTS = 181
-_PARAMETER = re.compile(r"length\d+_mm|E\d+_MPa|side_mm|remanence_mT|flux_mT|angle_deg")
+_UNIT = {
+    "length": "mm", "E": "MPa", "side": "mm", "remanence": "mT", "flux": "mT",
+    "angle": "deg",
+}  # fmt: skip
+"""Parameters of a specimen and a field, and the unit in which they are used."""
+
 DEGREES = ((0, 0), (1, 0), (0, 1), (1, 1), (2, 1))
 """Degrees in s / L and in the bend that are tried; (0, 0) is one constant."""
 
@@ -84,15 +93,37 @@ class Correction:
     cases: int
 
 
-def read_tables(paths: Sequence[Path]) -> list[Case]:
-    """Read exported tables.
+def read_tables(
+    paths: Sequence[Path],
+    *,
+    how: Reading | None = None,
+    specimen: Specimen | None = None,
+    flux: str = "",
+) -> list[Case]:
+    """Read exported shapes of any kind (`analysis.imports`) and their parameters.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Files with one or many shapes each.
+    how : Reading, optional
+        Unit, mirror image, frame of the files.
+    specimen : Specimen, optional
+        The rod, where the files do not describe it.
+    flux : str
+        Which of their parameters is the flux density, and its unit: ``B0=T``.
 
     Raises
     ------
-    ConfigError
-        If a file is no such table, or a parameter is missing: file and line.
+    ConfigError, InputError
+        If a file holds no shape, a parameter is missing, or a shape does not fit the
+        rod (length, clamp, theta, side).
     """
-    return [case for path in paths for case in _read_table(path)]
+    return [
+        _case(raw, how, specimen, flux)
+        for path in paths
+        for raw in read_raw_shapes(path)
+    ]
 
 
 def fit_correction(cases: Sequence[Case]) -> Correction:
@@ -270,51 +301,16 @@ def _deviation(case: Case, degree: tuple[int, int], coefficients: Array) -> floa
     return float(np.hypot(*away.T).max())
 
 
-def _read_table(path: Path) -> list[Case]:
-    table = read_table(path)
-    table.require("x_mm", "y_mm")
-    constants: dict[str, float] = {}
-    for comment in table.comments:
-        key, _, value = (part.strip() for part in comment.partition("="))
-        number = parse_number(value)
-        if _PARAMETER.fullmatch(key) and number is not None:
-            constants[key] = number
-    varied = [name for name in _parameters(table) if table.has(name)]
-    columns = {name: table.numbers(name) for name in ("x_mm", "y_mm", *varied)}
-    if table.has("s_mm"):
-        columns["s_mm"] = table.numbers("s_mm")
-    values = np.column_stack(
-        [np.zeros(len(table.rows)), *(columns[name] for name in varied)]
-    )
-    group = np.unique(values, axis=0, return_inverse=True)[1].ravel()
-    return [
-        _case(path, {n: c[group == g] for n, c in columns.items()}, constants)
-        for g in range(int(group.max()) + 1)
-    ]
-
-
-def _parameters(table: Table) -> list[str]:
-    """Names of the parameters that a table may have as columns."""
-    count = 1
-    while table.has(f"length{count + 1}_mm"):
-        count += 1
-    sections = [f"{key}{i + 1}{unit}" for i in range(count)
-                for key, unit in (("length", "_mm"), ("E", "_MPa"))]  # fmt: skip
-    return [*sections, "side_mm", "remanence_mT", "flux_mT", "angle_deg"]
-
-
-def _case(path: Path, columns: dict[str, Array], constants: dict[str, float]) -> Case:
-    values = constants | {
-        name: float(column[0])
-        for name, column in columns.items()
-        if name not in ("s_mm", "x_mm", "y_mm")
-    }
+def _case(
+    raw: RawShape, how: Reading | None, specimen: Specimen | None, flux: str
+) -> Case:
+    values = _values(raw, specimen, flux)
 
     def value(name: str) -> Array:
         if name not in values:
             raise ConfigError(
-                f"{path}: the parameter {name} is missing: give a column or a line "
-                f"'% {name} = ...'"
+                f"{raw.source}: the parameter {name} is missing: give a column or a "
+                f"line '% {name} = ...', or --specimen and --flux NAME=UNIT"
             )
         return np.array([values[name]])
 
@@ -329,17 +325,38 @@ def _case(path: Path, columns: dict[str, Array], constants: dict[str, float]) ->
         flux_mT=value("flux_mT"),
         angle_deg=np.array([values.get("angle_deg", 90.0)]),
     )
-    points = np.stack([columns["x_mm"], columns["y_mm"]], axis=1)
-    s_mm = columns.get("s_mm")
-    if s_mm is None:
-        steps = np.hypot(*np.diff(points, axis=0).T)
-        s_mm = np.concatenate([[0.0], np.cumsum(steps)])
-    order = np.argsort(s_mm, kind="stable")
-    case = Case(design=design, s_mm=s_mm, points_mm=points, source=path.name)
-    length_mm = float(design.length_mm.sum())
-    if len(order) < 3 or s_mm.max() > 1.01 * length_mm or s_mm.min() < -1e-9:
-        raise ConfigError(
-            f"{path}: a case must have at least three points with s_mm from 0 to "
-            f"{length_mm:g} mm; instead received {len(order)} up to {s_mm.max():g} mm"
-        )
-    return replace(case, s_mm=s_mm[order], points_mm=points[order])
+    load = float(design.remanence_mT[0] * design.flux_mT[0])
+    shape = judged(
+        raw, how, length_mm=float(design.length_mm.sum()),
+        side=load * math.sin(math.radians(float(design.angle_deg[0]))),
+    )  # fmt: skip
+    return Case(
+        design=design, s_mm=shape.line.s_mm, points_mm=shape.line.points_mm,
+        source=raw.source,
+    )  # fmt: skip
+
+
+def _values(raw: RawShape, specimen: Specimen | None, flux: str) -> dict[str, float]:
+    """Return the parameters of a case with the names and units of ours."""
+    values: dict[str, float] = {}
+    if specimen is not None:
+        values = {"side_mm": specimen.side_mm, "remanence_mT": specimen.remanence_mT}
+        for i, section in enumerate(specimen.sections, start=1):
+            values |= {f"length{i}_mm": section.length_mm, f"E{i}_MPa": section.E_MPa}
+    for head, number in raw.parameters.items():
+        quantity, unit = split_unit(head)
+        wanted = _UNIT.get(re.sub(r"\d+$", "", quantity), "")
+        factor = unit_factor(unit, wanted) if wanted else None
+        if factor is not None:
+            values[f"{quantity}_{wanted}"] = number * factor
+    if flux:
+        name, _, unit = flux.partition("=")
+        factor = unit_factor(unit, "mT")
+        if name not in raw.parameters or factor is None:
+            raise ConfigError(
+                f"{raw.source}: --flux must be NAME=UNIT with one of its parameters "
+                f"({', '.join(raw.parameters) or 'it has none'}), such as B0=T; "
+                f"instead received {flux!r}"
+            )
+        values["flux_mT"] = raw.parameters[name] * factor
+    return values

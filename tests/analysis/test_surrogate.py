@@ -185,10 +185,13 @@ def test_a_correction_learns_what_the_rod_misses(tmp_path):
     ("change", "sentence"),
     [
         (("% side_mm", "% sidemm"), "side_mm is missing"),
-        (("x (mm)", "z (mm)"), "must have the column.s. x_mm"),
+        (("x (mm)", "z (mm)"), "must have columns x and y"),
         ((" 50\n30 ", " 50\n30 30 "), "line 31: has more values"),
-        ((" 50\n30 ", " nan\n30 "), "must be a number"),
-        (("% length3_mm = 10.0", "% length3_mm = 2.0"), "from 0 to 22 mm"),
+        ((" 50\n30 ", " nan\n30 "), "flux_mT is missing"),
+        (
+            ("% length3_mm = 10.0", "% length3_mm = 2.0"),
+            "30 mm long, and the specimen 22 mm",
+        ),
     ],
 )
 def test_broken_tables_are_one_sentence(tmp_path, change, sentence):
@@ -196,9 +199,31 @@ def test_broken_tables_are_one_sentence(tmp_path, change, sentence):
     text = path.read_text()
     assert change[0] in text
     path.write_text(text.replace(*change, 1))
-    with pytest.raises(ConfigError, match=sentence) as error:
+    with pytest.raises(InputError, match=sentence) as error:
         read_tables([path])
     assert path.name in str(error.value)
+
+
+def test_a_native_sweep_needs_a_specimen_and_the_name_of_its_field(tmp_path):
+    rod, factor = gmc(2), 1e-3
+    heads, columns = ["X (m)"], []
+    for flux_mT in (40.0, 60.0, 80.0):
+        line = solve(rod, UniformField(flux_mT=flux_mT), model="solid").centreline
+        columns = columns or [line.s_mm * factor]
+        heads += [f"{axis} (m) @ B0={flux_mT * 1e-3:g}" for axis in "xy"]
+        columns += [line.x_mm * factor, line.y_mm * factor]
+    path = tmp_path / "sweep.txt"
+    rows = np.column_stack(columns)[::3]
+    np.savetxt(path, rows, "%.12g", "   ", header="   ".join(heads), comments="% ")
+    cases = read_tables([path], specimen=rod, flux="B0=T")
+    assert [float(case.design.flux_mT[0]) for case in cases] == [40.0, 60.0, 80.0]
+    assert fit_correction(cases).error_mm < 0.01
+    with pytest.raises(ConfigError, match=r"length1_mm is missing.*--specimen"):
+        read_tables([path])
+    with pytest.raises(ConfigError, match=r"--flux must be NAME=UNIT.*B0"):
+        read_tables([path], specimen=rod, flux="B=T")
+    with pytest.raises(InputError, match="add --flip"):
+        read_tables([path], specimen=replace(rod, remanence_mT=-20.0), flux="B0=T")
 
 
 def test_two_cases_are_too_few(tmp_path):
