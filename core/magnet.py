@@ -15,6 +15,25 @@ from .checks import finite, size, store, vector
 Vector = tuple[float, float, float]
 
 
+def axes_of(
+    axis_angle_deg: float, elevation_deg: float
+) -> tuple[Vector, Vector, Vector]:
+    """Return own x, y, z axes as unit vectors of the specimen frame.
+
+    Own z points along both angles (in degrees); own x stays in the specimen's xy plane.
+    """
+    a = math.radians(axis_angle_deg)
+    e = math.radians(elevation_deg)
+    z_axis = (math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e))
+    x_axis = (math.sin(a), -math.cos(a), 0.0)
+    y_axis = (
+        z_axis[1] * x_axis[2] - z_axis[2] * x_axis[1],
+        z_axis[2] * x_axis[0] - z_axis[0] * x_axis[2],
+        z_axis[0] * x_axis[1] - z_axis[1] * x_axis[0],
+    )
+    return x_axis, y_axis, z_axis
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Magnet:
     """A cuboid permanent magnet and its pose relative to the undeformed tip.
@@ -74,16 +93,7 @@ class Magnet:
 
         The magnet's x axis stays in the specimen's xy plane.
         """
-        a = math.radians(self.axis_angle_deg)
-        e = math.radians(self.elevation_deg)
-        z_axis = (math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e))
-        x_axis = (math.sin(a), -math.cos(a), 0.0)
-        y_axis = (
-            z_axis[1] * x_axis[2] - z_axis[2] * x_axis[1],
-            z_axis[2] * x_axis[0] - z_axis[0] * x_axis[2],
-            z_axis[0] * x_axis[1] - z_axis[1] * x_axis[0],
-        )
-        return x_axis, y_axis, z_axis
+        return axes_of(self.axis_angle_deg, self.elevation_deg)
 
     def centre_mm(self, *, length_mm: float, gap_mm: float) -> Vector:
         """Return the magnet's centre in the specimen frame, in mm.

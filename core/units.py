@@ -30,6 +30,11 @@ _TESLA_PER = {
 }
 
 
+def cos_deg(angle_deg: float) -> float:
+    """Return the cosine of an angle in degrees, exactly zero at right angles."""
+    return 0.0 if angle_deg % 180.0 == 90.0 else math.cos(math.radians(angle_deg))
+
+
 def m_from_mm(length_mm: float) -> float:
     """Return a length in m."""
     return length_mm * 1e-3

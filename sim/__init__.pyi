@@ -58,14 +58,53 @@ from .magnet.fit import (
 from .magnet.fit import (
     fit_magnet as fit_magnet,
 )
+from .magnet.map import (
+    FieldMap as FieldMap,
+)
+from .magnet.map import (
+    read_map as read_map,
+)
+from .magnet.map import (
+    sampled_map as sampled_map,
+)
 from .one_rod import (
     solve as solve,
+)
+from .probe import (
+    flux_mT as flux_mT,
+)
+from .rods import (
+    Rod as Rod,
+)
+from .rods import (
+    Section as Section,
 )
 from .sensitivity.derivatives import (
     Sensitivities as Sensitivities,
 )
 from .sensitivity.derivatives import (
     sensitivities as sensitivities,
+)
+from .sources import (
+    Coil as Coil,
+)
+from .sources import (
+    Cuboid as Cuboid,
+)
+from .sources import (
+    Cylinder as Cylinder,
+)
+from .sources import (
+    Dipole as Dipole,
+)
+from .sources import (
+    Gradient as Gradient,
+)
+from .sources import (
+    Uniform as Uniform,
+)
+from .sources import (
+    read_field as read_field,
 )
 from .spatial.rod import (
     SpatialRod as SpatialRod,

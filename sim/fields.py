@@ -5,16 +5,21 @@ Specimen frame and units as everywhere (`core.centreline`): mm, mT, degrees.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from ..core.centreline import Centreline
-from ..core.checks import shown, size, store, vector, within
+from ..core.checks import listed, shown, size, store, vector, within
 from ..core.errors import InputError
 from ..core.magnet import Magnet
+from ..core.sources import FLUX_LIMIT_T, Cuboid, Source, Uniform
 from ..core.specimen import Specimen
-
-FLUX_LIMIT_T = 30.0
-"""Fields and remanences above this are refused as mistaken units (mT for T)."""
+from ..core.units import cos_deg
 
 GRAVITY_LIMIT_M_S2 = 1000.0
 """Weight beyond about a hundred g is refused as a mistaken unit."""
@@ -24,8 +29,101 @@ UNSTABLE = "unstable"
 PULLED_IN = "pulled in: no equilibrium"
 
 
+class Field:
+    """A field: the sum of its sources.
+
+    Parameters
+    ----------
+    *sources : Cuboid, Cylinder, Dipole, Coil, Uniform, Gradient or FieldMap
+        Any number; or one sequence of them.
+    gap_mm : float, optional
+        Gap of those sources that have neither a centre nor a gap of their own.
+
+    Raises
+    ------
+    InputError
+        If there is none, or something that is no source.
+
+    Examples
+    --------
+    >>> from magbend.sim import Cuboid, Field, Uniform, gmc, solve
+    >>> field = Field(Cuboid(sides_mm=55.0, remanence_T=1.3, gap_mm=60.0),
+    ...               Uniform(flux_mT=-5.0))
+    >>> round(solve(gmc(2), field).centreline.tip_mm[1], 3)
+    3.76
+    """
+
+    __slots__ = ("_sources",)
+    _sources: tuple[Source, ...]
+
+    def __init__(
+        self, *sources: Source | Iterable[Source], gap_mm: float | None = None
+    ) -> None:
+        given: Any = sources
+        if len(sources) == 1 and not hasattr(sources[0], "kind"):
+            given = listed(sources[0]) or ()
+        for source in given:
+            if not hasattr(source, "follows_gap"):
+                raise InputError(
+                    "sources of a field must each be a Cuboid, Cylinder, Dipole, Coil, "
+                    f"Uniform, Gradient or FieldMap; instead received {shown(source)}"
+                )
+        if not given:
+            raise InputError(
+                "a field must have at least one source; instead received 0"
+            )
+        self._sources = tuple(given)
+        if gap_mm is not None:
+            self._sources = self.at_gap(gap_mm)._sources
+
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """What it is the sum of."""
+        return self._sources
+
+    @property
+    def in_plane(self) -> bool:
+        """Whether it has no component across the rod's plane z = 0, in that plane."""
+        return all(source.in_plane for source in self.sources)
+
+    @property
+    def follows_gap(self) -> bool:
+        """Whether a source waits for a gap."""
+        return any(source.follows_gap for source in self.sources)
+
+    @property
+    def uniform(self) -> UniformField | None:
+        """The field in the plane, if it is uniform and within the plane; else None."""
+        if not all(type(one) is Uniform and one.in_plane for one in self.sources):
+            return None
+        if len(self.sources) == 1:
+            one: Any = self.sources[0]
+            return UniformField(flux_mT=one.flux_mT, angle_deg=one.angle_deg)
+        parts: Any = self.sources
+        x = sum(one.flux_mT * cos_deg(one.angle_deg) for one in parts)
+        y = sum(one.flux_mT * cos_deg(one.angle_deg - 90.0) for one in parts)
+        angle_deg = math.degrees(math.atan2(y, x))
+        return UniformField(flux_mT=math.hypot(x, y), angle_deg=angle_deg)
+
+    def at_gap(self, gap_mm: float) -> Field:
+        """Return the field with the sources that wait for a gap at this one, in mm."""
+        return Field(
+            replace(source, gap_mm=gap_mm) if source.follows_gap else source  # type: ignore[type-var, call-arg]
+            for source in self.sources
+        )
+
+    def __eq__(self, other: object) -> bool:
+        return type(other) is Field and self._sources == other._sources
+
+    def __hash__(self) -> int:
+        return hash(self._sources)
+
+    def __repr__(self) -> str:
+        return f"Field{self._sources!r}"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class UniformField:
+class UniformField(Field):
     """A uniform field in the specimen's plane.
 
     Parameters
@@ -52,9 +150,24 @@ class UniformField:
             angle_deg=within(self.angle_deg, -36000.0, 36000.0, "angle_deg", "deg"),
         )
 
+    @property
+    def sources(self) -> tuple[Source, ...]:
+        """The one source."""
+        return (Uniform(flux_mT=self.flux_mT, angle_deg=self.angle_deg),)
+
+    @property
+    def in_plane(self) -> bool:
+        """It is."""
+        return True
+
+    @property
+    def uniform(self) -> UniformField:
+        """Itself."""
+        return self
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MagnetField:
+class MagnetField(Field):
     """The field of a cuboid magnet at a gap from the undeformed tip.
 
     Parameters
@@ -87,12 +200,60 @@ class MagnetField:
         )  # fmt: skip
 
     @property
+    def sources(self) -> tuple[Source, ...]:
+        """The one source."""
+        return (cuboid_of(self.magnet, self.gap_mm),)
+
+    @property
     def in_plane(self) -> bool:
         """Whether the magnet is symmetric about the plane z = 0 of the rod."""
         return self.magnet.elevation_deg == 0.0 and self.magnet.offset_mm[2] == 0.0
 
+    @property
+    def uniform(self) -> None:
+        """It is not."""
 
-Field = UniformField | MagnetField
+
+def cuboid_of(magnet: Magnet, gap_mm: float | None = None) -> Cuboid:
+    """Return a magnet as a source; without a gap, one that waits for it."""
+    return Cuboid(
+        sides_mm=magnet.sides_mm, remanence_T=magnet.remanence_T, gap_mm=gap_mm,
+        axis_angle_deg=magnet.axis_angle_deg, elevation_deg=magnet.elevation_deg,
+        offset_mm=magnet.offset_mm,
+    )  # fmt: skip
+
+
+def as_field(given: object, other: str = "or a source") -> Field:
+    """Return a field, a single source or several of them as a field.
+
+    Raises
+    ------
+    InputError
+        If it is none of these.
+    """
+    if isinstance(given, Field):
+        return given
+    if hasattr(given, "follows_gap") or isinstance(given, (list, tuple)):
+        return Field(given)  # type: ignore[arg-type]
+    raise InputError(
+        "field must be a UniformField in mT, a MagnetField in mm, a Field of sources "
+        f"{other}; instead received {shown(given)}"
+    )
+
+
+def gap_of(field: object) -> str:
+    """Return what a message says of where the sources stand."""
+    gaps = [
+        gap for one in as_field(field).sources if (gap := getattr(one, "gap_mm", 0))
+    ]
+    if gaps:
+        return " and ".join(f"{gap:g} mm" for gap in gaps)
+    return shown(field)
+
+
+def before(magnet: Magnet | Field) -> Field:
+    """Return a magnet, or a field whose sources wait for a gap, as a field."""
+    return magnet if isinstance(magnet, Field) else Field(cuboid_of(magnet))
 
 
 def check_case(specimen: object, field: object, support: object) -> None:
@@ -108,15 +269,31 @@ def check_case(specimen: object, field: object, support: object) -> None:
             "specimen must be a Specimen, as gmc(2) is; instead received "
             f"{shown(specimen)}"
         )
-    if not isinstance(field, (UniformField, MagnetField)):
-        raise InputError(
-            "field must be a UniformField in mT or a MagnetField in mm; instead "
-            f"received {shown(field)}"
-        )
+    as_field(field)
     if not isinstance(support, Support):
         raise InputError(
             f"support must be a Support; instead received {shown(support)}"
         )
+
+
+def refuse_outside(field: Field, points_mm: NDArray[np.float64]) -> None:
+    """Refuse a rod that leaves the box of a map: nobody measured there.
+
+    Raises
+    ------
+    InputError
+        If one of its points, shape (n, 3), does.
+    """
+    if type(field) is not Field:
+        return
+    for source in field.sources:
+        holds = getattr(source, "holds", None)
+        if holds is not None and not holds(points_mm):
+            raise InputError(
+                "the rod leaves the box of the map of the field, from "
+                f"{source.low_mm.tolist()} to {source.high_mm.tolist()} mm: measure "  # type: ignore[attr-defined]
+                "farther out"
+            )
 
 
 def check_plain(specimen: Specimen) -> None:

@@ -20,8 +20,9 @@ from .fields import (
     Field,
     Solution,
     Support,
-    UniformField,
+    as_field,
     check_case,
+    refuse_outside,
 )
 from .planar.solver import GONE, ORDER, STEP, failure, solve_planar
 from .planar.swing import swing_index
@@ -47,7 +48,7 @@ def solve(
     ----------
     specimen : Specimen
         The rod.
-    field : UniformField or MagnetField
+    field : UniformField, MagnetField, Field, or sources
         What bends it.
     support : Support
         Clamp direction, weight, and a factor on the magnetic load.
@@ -80,6 +81,7 @@ def solve(
     >>> [round(value, 5) for value in solution.centreline.tip_mm]
     [29.53532, 4.70952]
     """
+    field = as_field(field)
     check_case(specimen, field, support)
     points = whole(points, 2, MOST_POINTS, "points")
     if not isinstance(model, str) or model not in ("rod", "solid"):
@@ -92,7 +94,7 @@ def solve(
         return solve_solid(
             specimen, field, support=support, poisson_ratio=poisson_ratio, points=points
         )
-    in_plane = support.in_plane and (isinstance(field, UniformField) or field.in_plane)
+    in_plane = support.in_plane and field.in_plane
     if not (in_plane and specimen.is_plain):
         from .spatial.solver import solve_spatial
 
@@ -118,6 +120,7 @@ def solve(
         centreline = Centreline._trusted(
             s * length_mm, x * length_mm, y * length_mm, theta, kappa / length_mm
         )
+        refuse_outside(field, np.column_stack([x, y, 0.0 * x]) * length_mm)
         stable_in_space = index == 0 and swing_index(rod, flux, tip, STEP) == 0
     return Solution(
         centreline=centreline,

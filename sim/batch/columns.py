@@ -9,7 +9,7 @@ from ...core.arrays import real_array
 from ...core.checks import positive, shown, within
 from ...core.errors import InputError
 from ...core.magnet import Magnet
-from ..fields import FLUX_LIMIT_T
+from ..fields import FLUX_LIMIT_T, Field
 
 COLUMNS = {
     "side_mm": (1e-9, 1e9, "mm"),
@@ -54,9 +54,18 @@ def check_magnet(magnet: object) -> None:
     InputError
         If it is either.
     """
+    if isinstance(magnet, Field):
+        if not magnet.in_plane or not magnet.follows_gap:
+            raise InputError(
+                "magnet of batches must be a field within the plane z = 0, of which a "
+                "source has neither centre_mm nor gap_mm in mm; instead received "
+                f"{shown(magnet)}"
+            )
+        return
     if not isinstance(magnet, Magnet):
         raise InputError(
-            f"magnet must be a Magnet for gap_mm; instead received {shown(magnet)}"
+            "magnet must be a Magnet or a Field of sources for gap_mm; instead "
+            f"received {shown(magnet)}"
         )
     if magnet.elevation_deg != 0.0 or magnet.offset_mm[2] != 0.0:
         raise InputError(

@@ -16,12 +16,13 @@ from ...core.checks import finite, shown, store, whole
 from ...core.errors import InputError
 from ...core.magnet import Magnet
 from ...core.specimen import Specimen
+from ..fields import Field, before
 from ..planar.solver import GONE, OK_UNSTABLE, TOUCHES, solve_planar_rows
 from ..scaling import (
     MOST_POINTS,
-    many_magnet_fields,
+    field_rows,
     many_rods,
-    many_uniform_fields,
+    uniform_rows,
 )
 from .columns import COLUMNS, check_magnet, column
 from .threads import in_threads
@@ -53,7 +54,7 @@ class Designs:
         Uniform field; None before a magnet.
     angle_deg : ndarray, shape (n,)
         Direction of the uniform field; not used before a magnet.
-    magnet : Magnet or None
+    magnet : Magnet, Field or None
     gap_mm : ndarray, shape (n,), or None
         Gap of the magnet.
 
@@ -70,7 +71,7 @@ class Designs:
     remanence_mT: Array
     flux_mT: Array | None = None
     angle_deg: Array
-    magnet: Magnet | None = None
+    magnet: Magnet | Field | None = None
     gap_mm: Array | None = None
 
     def __post_init__(self) -> None:
@@ -202,9 +203,9 @@ def solve_shapes(
         stations = _section_stations(rods[:, ::-1, 0], points)
     stations = np.broadcast_to(stations, (n, points))
     if designs.magnet is not None and designs.gap_mm is not None:
-        fields = many_magnet_fields(designs.magnet, designs.gap_mm, total_mm)
+        fields = field_rows(before(designs.magnet), designs.gap_mm, total_mm)
     elif designs.flux_mT is not None:
-        fields = many_uniform_fields(designs.flux_mT * 1e-3, designs.angle_deg)
+        fields = uniform_rows(designs.flux_mT * 1e-3, designs.angle_deg)
     columns = stations, rods, fields, total_mm, margins, out, status, error
     in_threads(lambda rows: _solve(*(c[rows] for c in columns)), n, ROWS_PER_CALL)
     return Shapes(points=out, status=status, error_mm=error)

@@ -17,10 +17,10 @@ from ...core.cross_section import ALL_SIZES, SIZES
 from ...core.errors import InputError
 from ...core.magnet import Magnet
 from ...core.progress import Progress, silent
-from ..fields import PULLED_IN, STABLE, UNSTABLE
+from ..fields import PULLED_IN, STABLE, UNSTABLE, Field, before
 from ..magnet.field import magnet_block
 from ..planar.solver import OK_UNSTABLE, TOUCHES, solve_planar_rows
-from ..scaling import direction, many_magnet_fields, many_rods, many_uniform_fields
+from ..scaling import direction, field_rows, many_rods, uniform_rows
 from .columns import COLUMNS, check_magnet, column
 from .lanes import HARD, solve_lanes
 from .threads import in_threads
@@ -51,7 +51,7 @@ _MOST_THREADS = 1024
 def solve_many(
     designs: Mapping[str, ArrayLike] | NDArray[np.void],
     *,
-    magnet: Magnet | None = None,
+    magnet: Magnet | Field | None = None,
     progress: Progress = silent,
     stop: Callable[[], bool] | None = None,
     threads: int | None = None,
@@ -113,7 +113,7 @@ def solve_many(
 
 
 def _columns(
-    designs: Mapping[str, ArrayLike] | NDArray[np.void], magnet: Magnet | None
+    designs: Mapping[str, ArrayLike] | NDArray[np.void], magnet: Magnet | Field | None
 ) -> dict[str, Array]:
     """Return the columns, checked: those of sections (n, k), the others (n,)."""
     if magnet is not None:
@@ -181,7 +181,7 @@ def _given(
 
 
 def _solve_chunk(
-    columns: dict[str, Array], magnet: Magnet | None, out: NDArray[np.void]
+    columns: dict[str, Array], magnet: Magnet | Field | None, out: NDArray[np.void]
 ) -> None:
     """Solve one chunk into `out`."""
     rods, total_mm, margins = many_rods(
@@ -194,25 +194,23 @@ def _solve_chunk(
     if magnet is None:
         flux_T = columns["flux_mT"] * 1e-3
         field = flux_T, *direction(columns["angle_deg"]), none, none
-    else:
-        field = (
-            none,
-            none,
-            none,
-            magnet_block(magnet, length_mm=0.0, gap_mm=0.0),
-            columns["gap_mm"],
-        )
+    elif isinstance(magnet, Magnet):
+        block = magnet_block(magnet, length_mm=0.0, gap_mm=0.0)
+        field = none, none, none, block, columns["gap_mm"]
     tips = np.empty((n, 4))
     outcome = np.empty(n, dtype=np.int8)
     index = np.zeros(n, dtype=np.int8)
-    solve_lanes(rods, total_mm, margins, *field, tips, outcome)
+    if isinstance(magnet, Field):
+        outcome[:] = HARD
+    else:
+        solve_lanes(rods, total_mm, margins, *field, tips, outcome)
     hard = np.flatnonzero(outcome == HARD)
     if len(hard):
         if magnet is None:
-            fields = many_uniform_fields(flux_T[hard], columns["angle_deg"][hard])
+            fields = uniform_rows(flux_T[hard], columns["angle_deg"][hard])
         else:
             gap_mm = columns["gap_mm"][hard]
-            fields = many_magnet_fields(magnet, gap_mm, total_mm[hard])
+            fields = field_rows(before(magnet), gap_mm, total_mm[hard])
         found = _solve_hard(rods[hard], fields, margins[hard])
         tips[hard], outcome[hard], index[hard] = found
     out["tip_x_mm"] = tips[:, 0] * total_mm

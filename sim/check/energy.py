@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.specimen import Specimen
-from ...core.units import MU0, rad_from_deg
-from ..fields import Field, Support, UniformField
-from ..magnet.field import magnet_flux_mT, magnet_gradient_mT_per_mm
+from ...core.units import MU0
+from ..fields import Field, Support
+from ..probe import field_table
 
 Array = NDArray[np.float64]
 
@@ -141,18 +141,10 @@ def _integrals(xi: Array) -> Array:
 
 def _flux(field: Field, length_mm: float, r: Array) -> tuple[Array, Array]:
     """B (q, 2) in T and dB_i/dx_j (q, 2, 2) in T/m at positions (q, 2) in m."""
-    if isinstance(field, UniformField):
-        angle = rad_from_deg(field.angle_deg)
-        b = field.flux_mT * 1e-3 * np.array([np.cos(angle), np.sin(angle)])
-        return np.tile(b, (len(r), 1)), np.zeros((len(r), 2, 2))
     points = np.column_stack([r * 1e3, np.zeros(len(r))])
-    flux = magnet_flux_mT(
-        field.magnet, points, length_mm=length_mm, gap_mm=field.gap_mm
-    )
-    gradient = magnet_gradient_mT_per_mm(
-        field.magnet, points, length_mm=length_mm, gap_mm=field.gap_mm
-    )
-    return flux[:, :2] * 1e-3, gradient[:, :2, :2]
+    table = field_table(field, points, length_mm=length_mm)
+    gradient = table[:, 3:].reshape(-1, 3, 3) * 1e3
+    return table[:, :2], gradient[:, :2, :2]
 
 
 def energy(
@@ -192,7 +184,7 @@ def hessian(
     H = grid.slope.T @ ((w * grid.EI)[:, None] * grid.slope)
     own = w * m * np.einsum("qi,qi->q", t, B) + np.einsum("qi,qi->q", t, beyond)
     H += grid.angle.T @ (own[:, None] * grid.angle)
-    if isinstance(field, UniformField):
+    if field.uniform is not None:
         return H
     # dr = place (n dtheta); the field acts on it through G and its derivative.
     move = [grid.place @ (n[:, i, None] * grid.angle) for i in range(2)]

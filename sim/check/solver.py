@@ -26,7 +26,7 @@ from ...core.checks import listed, shown, whole
 from ...core.errors import InputError, SolverError
 from ...core.specimen import Specimen
 from ...core.units import rad_from_deg
-from ..fields import Field, Solution, Support, UniformField, check_case, check_plain
+from ..fields import Field, Solution, Support, as_field, check_case, check_plain
 from .energy import Discretisation, discretise, energy, hessian, lagrange, node_places
 
 Array = NDArray[np.float64]
@@ -178,11 +178,12 @@ def check_solve(
         If Newton's method does not converge.
     """
     support = support or Support()
+    field = as_field(field)
     check_case(specimen, field, support)
     check_plain(specimen)
     degree = whole(degree, 1, MOST_DEGREE, "degree")
     elements = whole(elements, 1, 1000, "elements")
-    if not support.in_plane or not (isinstance(field, UniformField) or field.in_plane):
+    if not support.in_plane or not field.in_plane:
         raise InputError(
             "the check solver takes magnets and weight within the plane z = 0; instead "
             f"received gravity_m_s2 {support.gravity_m_s2} m/s2 and {field}"

@@ -23,7 +23,15 @@ from ...core.checks import whole
 from ...core.errors import InputError, SolverError
 from ...core.specimen import Specimen
 from ...core.units import T_from_mT
-from ..fields import STABLE, UNSTABLE, Support, UniformField, check_case, check_plain
+from ..fields import (
+    STABLE,
+    UNSTABLE,
+    Support,
+    UniformField,
+    as_field,
+    check_case,
+    check_plain,
+)
 from ..planar.march import E, H, M
 from ..scaling import rod_array, stiffness_Nmm2
 from .march import ORDER, march, scan
@@ -102,7 +110,7 @@ def planar_rod(specimen: Specimen, field: UniformField, support: Support) -> Pla
     """
     check_case(specimen, field, support)
     check_plain(specimen)
-    if not isinstance(field, UniformField):
+    if (uniform := as_field(field).uniform) is None:
         raise InputError(
             "field must be a UniformField for the scan of all equilibria; instead "
             f"received {field}"
@@ -113,11 +121,11 @@ def planar_rod(specimen: Specimen, field: UniformField, support: Support) -> Pla
             f"received {support.gravity_m_s2} m/s2: use solve() for shapes with weight"
         )
     rows = rod_array(specimen, support)
-    moment = rows[:, M] * T_from_mT(field.flux_mT)
+    moment = rows[:, M] * T_from_mT(uniform.flux_mT)
     turned = np.pi if moment[0] < 0.0 else 0.0
     if turned:
         moment = -moment
-    pull = float(np.radians(field.angle_deg - support.clamp_angle_deg) + turned)
+    pull = float(np.radians(uniform.angle_deg - support.clamp_angle_deg) + turned)
     pull -= 2.0 * np.pi * np.floor(pull / (2.0 * np.pi))
     if min(pull, 2.0 * np.pi - pull) < STRAIGHT:
         pull = 0.0
@@ -131,7 +139,7 @@ def planar_rod(specimen: Specimen, field: UniformField, support: Support) -> Pla
     if np.max(np.abs(moment / rod.stiffness)) > LOAD_LIMIT:
         raise InputError(
             f"flux_mT must keep m B L^2 / EI below {LOAD_LIMIT:g}; instead received "
-            f"{field.flux_mT:g} mT, which makes it "
+            f"{uniform.flux_mT:g} mT, which makes it "
             f"{np.max(np.abs(moment / rod.stiffness)):.3g}"
         )
     return rod

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from ...core.errors import InputError, SolverError
 from ...core.jit import njit
 from ...core.specimen import Specimen
-from ..fields import Field
+from ..fields import Field, gap_of
 from ..magnet.flux import PART, blocked, in_reach, is_uniform
 from .contact import load_before_touching, touches_in_plane
 from .follow import SHRINK, SMALL, follow_load, residual, solve3, straight
@@ -365,10 +365,10 @@ def failure(
 ) -> InputError | SolverError:
     """Return the error that says why the kernel gave no answer."""
     if outcome == TOUCHES:
-        gap_mm = getattr(field, "gap_mm", float("nan"))
         return InputError(
-            f"gap_mm must leave the undeformed rod {specimen.name!r} clear of the "
-            f"magnet, with half its side to spare; instead received {gap_mm:g} mm"
+            f"gap_mm (or centre_mm) must leave the undeformed rod {specimen.name!r} "
+            "clear of the magnet, with half its side to spare; instead received "
+            f"{gap_of(field)}"
         )
     if outcome == TOO_STRONG:
         return InputError(

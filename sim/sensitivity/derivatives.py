@@ -18,7 +18,7 @@ from ...core.checks import listed, shown
 from ...core.errors import InputError, SolverError
 from ...core.specimen import Specimen
 from ...core.units import rad_from_deg
-from ..fields import Field, Solution, Support, UniformField, check_case, check_plain
+from ..fields import Field, Solution, Support, as_field, check_case, check_plain
 from ..one_rod import NO_SUPPORT, solve
 from ..planar.solver import ORDER, STEP, solve_planar
 from ..scaling import field_array, rod_array, stations
@@ -90,9 +90,10 @@ def sensitivities(
     SolverError
         If there is no equilibrium, or it stands at a fold.
     """
+    field = as_field(field)
     check_case(specimen, field, support)
     names = _names(parameters)
-    if not (support.in_plane and (isinstance(field, UniformField) or field.in_plane)):
+    if not (support.in_plane and field.in_plane):
         raise InputError(
             "gravity_m_s2[2] in m/s2, magnet elevation_deg and offset_mm[2] must be 0 "
             "for sensitivities, which are planar; instead received one that is not"
@@ -132,7 +133,7 @@ def _derivatives(
     """Return theta, x and y by parameter, shape (n, 3, p), and whether they exist."""
     blocks = (3 + len(parameters) + 3) // 4
     rods = np.zeros((len(rod), blocks, 4, rod.shape[1]))
-    changes = np.zeros((blocks, 4, 6))
+    changes = np.zeros((blocks, 4, len(parameters[0].field) if parameters else 1, 6))
     clamps = np.zeros((blocks, 4))
     for column, change in enumerate(parameters, start=3):
         n, a = divmod(column, 4)

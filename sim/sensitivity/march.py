@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ...core.jit import njit
-from ..magnet.flux import PART, field_at
+from ..magnet.flux import PART, field_at, plane_source, source_at, sources_in
 from ..planar.follow import solve3
 from ..planar.march import (
     STATE,
@@ -27,15 +27,23 @@ from ..planar.march import (
 
 
 @njit(**PART)
-def _field_change(field, change, x, y, b):  # type: ignore[no-untyped-def]
-    """Return dB of one parameter at a fixed point (module docstring)."""
-    fx = change[0] + change[2] * b[0] - b[2] * change[3] - b[3] * change[4]
-    fy = change[1] + change[2] * b[1] - b[3] * change[3] - b[4] * change[4]
-    if change[5] != 0.0:
-        dx = x - field[4]
-        dy = y - field[5]
-        fx += change[5] * (-b[1] + b[2] * dy - b[3] * dx)
-        fy += change[5] * (b[0] + b[3] * dy - b[4] * dx)
+def _field_change(field, changes, x, y, parts):  # type: ignore[no-untyped-def]
+    """Return dB of one parameter at a fixed point (`sensitivity.parameters`).
+
+    `parts`, shape (sources, 5), holds what each source does there.
+    """
+    fx = fy = 0.0
+    for i in range(changes.shape[0]):
+        change = changes[i]
+        b = parts[i]
+        fx += change[0] + change[2] * b[0] - b[2] * change[3] - b[3] * change[4]
+        fy += change[1] + change[2] * b[1] - b[3] * change[3] - b[4] * change[4]
+        if change[5] != 0.0:
+            source = source_at(field, i)
+            dx = x - source[4]
+            dy = y - source[5]
+            fx += change[5] * (-b[1] + b[2] * dy - b[3] * dx)
+            fy += change[5] * (b[0] + b[3] * dy - b[4] * dx)
     return fx, fy
 
 
@@ -43,11 +51,17 @@ def _field_change(field, change, x, y, b):  # type: ignore[no-untyped-def]
 def _load_columns(field, m, dm, changes, x, y, cf, sf, D):  # type: ignore[no-untyped-def]
     """Add to all columns the change of the load m B(r) of the point (x, y)."""
     b = field_at(field, x, y)
+    parts = np.empty((sources_in(field), 5))
+    own, one = np.empty(12), np.empty(12)
+    for i in range(parts.shape[0]):
+        part = plane_source(field, i, x, y, own, one)
+        for k in range(5):
+            parts[i, k] = part[k]
     for n in range(D.shape[0]):
         for a in range(4):
             dx = cf * D[n, 2, a] - sf * D[n, 3, a]
             dy = sf * D[n, 2, a] + cf * D[n, 3, a]
-            bx, by = _field_change(field, changes[n, a], x, y, b)
+            bx, by = _field_change(field, changes[n, a], x, y, parts)
             bx += b[2] * dx + b[3] * dy
             by += b[3] * dx + b[4] * dy
             fx = m * bx + dm[n, a] * b[0]
@@ -157,7 +171,7 @@ def parameter_columns(rod, field, u, rods, changes, clamps, s, order, step, out)
     rods : ndarray, shape (sections, b, 4, 5)
         Derivatives of the rod's rows with respect to parameters, in b blocks of four;
         the first three columns, those of the unknowns, are zero.
-    changes, clamps : ndarray, shapes (b, 4, 6), (b, 4)
+    changes, clamps : ndarray, shapes (b, 4, sources, 6), (b, 4)
         The same of the field (module docstring) and of the clamp angle.
     s : ndarray, shape (n,)
         Stations.

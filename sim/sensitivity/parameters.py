@@ -1,11 +1,11 @@
 """What a named parameter changes in the input of the planar kernels.
 
 It is given as the derivative of the rod array (n, 5), of the field and of the clamp
-angle. The field's is (bx, by, scale, cx, cy, omega): at a fixed point
+angle. The field's is (bx, by, scale, cx, cy, omega) of each source: at a fixed point
 
     dB = (bx, by) + scale B - G c + omega (J B - G J (r - centre))
 
-for a change of its value, a factor, a shift c of the magnet and a turn omega of it
+for a change of its value, a factor, a shift c of the source and a turn omega of it
 about its own centre, where G is the gradient and J turns by 90 degrees.
 """
 
@@ -18,16 +18,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.checks import finite
 from ...core.cross_section import ALL_SIZES, SIZES
 from ...core.errors import InputError
+from ...core.sources import Posed, Source, Uniform
 from ...core.specimen import Specimen
-from ...core.units import rad_from_deg
-from ..fields import Field, MagnetField, Support, UniformField
+from ...core.units import cos_deg, rad_from_deg
+from ..fields import Field, Support
 from ..planar.march import WX, WY, E, H, M
-from ..scaling import checked_density, field_array, loads_per_unit, rod_array
+from ..scaling import checked_density, loads_per_unit, rod_array
 
 Array = NDArray[np.float64]
+
+
+STRENGTHS = ("remanence_T", "moment_A_m2", "current_A")
+"""Numbers to which the field of a source is proportional."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -47,7 +51,10 @@ def change_of(name: str, specimen: Specimen, field: Field, support: Support) -> 
     InputError
         If the parameter is unknown or has no meaning for this case.
     """
-    change = Change(rod=np.zeros((len(specimen.sections), 5)), field=np.zeros(6))
+    change = Change(
+        rod=np.zeros((len(specimen.sections), 5)),
+        field=np.zeros((len(field.sources), 6)),
+    )
     match = re.fullmatch(r"([\w.]+?)(?:\[(\d+)\])?", name)
     key = match.group(1) if match else name
     index = int(match.group(2)) if match and match.group(2) is not None else None
@@ -101,8 +108,9 @@ def _of_length(
     change: Change, i: int, specimen: Specimen, field: Field, support: Support
 ) -> None:
     change.rod[-1 - i, H] += 1.0 / specimen.length_mm
-    if isinstance(field, MagnetField):
-        change.field[3] += 1.0 / specimen.length_mm
+    for which, source in enumerate(field.sources):
+        if isinstance(source, Posed) and source.centre_mm is None:
+            change.field[which, 3] += 1.0 / specimen.length_mm
 
 
 _OF_ALL = (*ALL_SIZES, "remanence_mT")
@@ -145,45 +153,79 @@ def _of_field(
     specimen: Specimen,
     field: Field,
 ) -> None:
+    sources = field.sources
+    if key == "gap_mm" and index is None:
+        moved = [i for i, one in enumerate(sources) if getattr(one, "gap_mm", None)]
+        for i in moved:
+            _of_source(change, i, key, None, specimen, sources[i])
+        if not moved:
+            raise _unknown(name)
+        return
+    match = re.fullmatch(r"source\[(\d+)\]\.(\w+)(?:\[(\d)\])?", name)
+    if match and int(match.group(1)) < len(sources):
+        which, key = int(match.group(1)), match.group(2)
+        index = int(match.group(3)) if match.group(3) else None
+    elif len(sources) == 1 and (key.startswith("magnet.") or index is None):
+        which, key = 0, key.removeprefix("magnet.")
+    else:
+        raise _unknown(name)
+    if not _of_source(change, which, key, index, specimen, sources[which]):
+        raise _unknown(name)
+
+
+def _of_source(
+    change: Change,
+    which: int,
+    key: str,
+    index: int | None,
+    specimen: Specimen,
+    source: Source,
+) -> bool:
+    """Set the change by one number of a source; return whether it has this number."""
+    row = change.field[which]
     scale = 1.0 / specimen.length_mm
-    if isinstance(field, UniformField) and index is None:
-        unit = field_array(
-            UniformField(flux_mT=1.0, angle_deg=field.angle_deg), specimen.length_mm
-        )
-        if key == "flux_mT":
-            change.field[:2] = unit[1:3]
-            return
-        if key == "angle_deg":
-            turn = finite(field.flux_mT, "flux_mT", "mT") * rad_from_deg(1.0)
-            change.field[:2] = -unit[2] * turn, unit[1] * turn
-            return
-    if isinstance(field, MagnetField):
-        magnet = field.magnet
-        axis = np.array(magnet.axes()[2][:2])
-        if key == "gap_mm" and index is None:
-            change.field[3:5] = -axis * scale
-            return
-        if key == "magnet.remanence_T" and index is None:
-            if magnet.remanence_T == 0.0:
-                raise InputError(
-                    "magnet remanence_T must not be 0 T where its derivative is asked "
-                    "for; instead received 0"
-                )
-            change.field[2] = 1.0 / magnet.remanence_T
-            return
-        if key == "magnet.axis_angle_deg" and index is None:
-            turn = rad_from_deg(1.0)
-            distance = (field.gap_mm + magnet.sides_mm[2] / 2.0) * scale
-            change.field[3] = distance * axis[1] * turn
-            change.field[4] = -distance * axis[0] * turn
-            change.field[5] = turn
-            return
-        if key == "magnet.offset_mm" and index in (0, 1, 2):
-            # Across the plane the field is symmetric: the planar shape does not change.
-            if index < 2:
-                change.field[3 + index] = scale
-            return
-    raise _unknown(name)
+    if isinstance(source, Uniform):
+        return index is None and _of_uniform(row, key, source)
+    if index is None and key in STRENGTHS and getattr(source, key, None) is not None:
+        value = float(getattr(source, key))
+        if value == 0.0:
+            raise InputError(
+                f"{key} of a {source.kind} must not be 0 where its derivative is asked "
+                "for; instead received 0"
+            )
+        row[2] = 1.0 / value
+        return True
+    if not isinstance(source, Posed):
+        return False
+    axis = np.array(source.axes()[2][:2])
+    place = "offset_mm" if source.centre_mm is None else "centre_mm"
+    if key == "gap_mm" and index is None and source.gap_mm is not None:
+        row[3:5] = -axis * scale
+    elif key == "axis_angle_deg" and index is None:
+        row[5] = rad_from_deg(1.0)
+        if source.gap_mm is not None:
+            distance = (source.gap_mm + source.half_mm) * scale
+            row[3:5] = distance * row[5] * np.array([axis[1], -axis[0]])
+    elif key == place and index in (0, 1, 2):
+        # Across the plane the field is symmetric: the planar shape does not change.
+        if index < 2:
+            row[3 + index] = scale
+    else:
+        return False
+    return True
+
+
+def _of_uniform(row: Array, key: str, source: Uniform) -> bool:
+    angle_deg = source.angle_deg
+    along = np.array([cos_deg(angle_deg), cos_deg(angle_deg - 90.0)])
+    if key == "flux_mT":
+        row[:2] = along * 1e-3
+    elif key == "angle_deg":
+        turn = source.flux_mT * 1e-3 * rad_from_deg(1.0)
+        row[:2] = -along[1] * turn, along[0] * turn
+    else:
+        return False
+    return True
 
 
 def _unknown(name: str) -> InputError:

@@ -40,9 +40,10 @@ from ..fields import (  # fmt: skip
     Field,
     Solution,
     Support,
-    UniformField,
+    as_field,
     check_case,
     check_plain,
+    refuse_outside,
 )
 from ..magnet.flux import flux_at
 from ..planar.solver import COARSE_ORDER as START_ORDER
@@ -183,6 +184,7 @@ def solve_solid(
         If no answer was found that could be vouched for.
     """
     support = support or Support()
+    field = as_field(field)
     check_case(specimen, field, support)
     check_plain(specimen)
     if specimen.shape != "square":
@@ -221,6 +223,7 @@ def solve_solid(
         )  # fmt: skip
     _refuse_strain(held, load, moment)
     x, y, theta, kappa = table
+    refuse_outside(field, np.column_stack([x, y, 0.0 * x]) * L)
     centreline = Centreline._trusted(s * L, x * L, y * L, theta, kappa / L)
     return Solution(
         centreline=centreline,
@@ -312,7 +315,7 @@ def _refuse_strain(held: _Held, load: float, moment: float) -> None:
 
 
 def _refuse_spatial(field: Field, support: Support) -> None:
-    if not support.in_plane or not (isinstance(field, UniformField) or field.in_plane):
+    if not support.in_plane or not field.in_plane:
         raise InputError(
             "the solid model takes magnets and weight within the plane z = 0; instead "
             f"received gravity_m_s2 {support.gravity_m_s2} m/s2 and {field}: use "

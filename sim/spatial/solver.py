@@ -27,10 +27,11 @@ from ..fields import (
     STABLE,
     UNSTABLE,
     Field,
-    MagnetField,
     Solution,
     Support,
-    UniformField,
+    as_field,
+    gap_of,
+    refuse_outside,
 )
 from ..magnet.flux import UNIFORM, WIDTH, flux_at
 from ..planar.contact import load_before_touching, touches
@@ -189,8 +190,8 @@ def solve_spatial(
     unloaded = _unloaded(table, clamp, s)
     if flux[0] != UNIFORM and touches(flux, margin, s, unloaded):
         raise InputError(
-            "gap_mm must leave the undeformed rod clear of the magnet, with half its "
-            f"side to spare; instead received {getattr(field, 'gap_mm', math.nan):g} mm"
+            "gap_mm (or centre_mm) must leave the undeformed rod clear of the magnet, "
+            f"with half its side to spare; instead received {gap_of(field)}"
         )
     n = _steps(table, flux, unloaded[-1, :3])
     rest = flux, n, clamp, margin, s
@@ -203,6 +204,8 @@ def solve_spatial(
             return _equilibrium(less, *rest)[0] >= 0
 
         return _gone(flux, L, load_before_touching(load, clear), unloaded[-1])
+    if not _is_vector(field):
+        refuse_outside(as_field(field), states[:, 12:15] * L)
     return _solution(rod, table, flux, s, states, index, error)
 
 
@@ -246,17 +249,22 @@ def _held(
 
 
 def _flux_array(field: Field | Sequence[float], length_mm: float) -> Array:
-    if isinstance(field, (UniformField, MagnetField)):
-        return field_array(field, length_mm)
-    if not isinstance(field, (tuple, list, np.ndarray)) or len(field) != 3:
-        raise InputError(
-            "field must be a UniformField, a MagnetField or three floats (x, y, z) in "
-            f"mT; instead received {shown(field)}"
+    if not _is_vector(field):
+        return field_array(
+            as_field(field, "or three floats (x, y, z) in mT"), length_mm
         )
-    flux_mT = vector(field, "flux_mT", "mT", FLUX_LIMIT_T * 1e3)
+    flux_mT = vector(field, "flux_mT", "mT", FLUX_LIMIT_T * 1e3)  # type: ignore[arg-type]
     out = np.zeros(WIDTH)
     out[1:4] = np.array(flux_mT) * 1e-3
     return out
+
+
+def _is_vector(field: object) -> bool:
+    """Tell three numbers from a field and from sources."""
+    if isinstance(field, np.ndarray):
+        return True
+    listing = isinstance(field, (tuple, list))
+    return listing and not any(hasattr(one, "kind") for one in field)  # type: ignore[index]
 
 
 def _steps(table: Array, flux: Array, tip: Array) -> float:

@@ -186,12 +186,12 @@ def _number(value: str, study: str) -> float:
 
 
 def _uniform(field: UniformField | MagnetField, study: str) -> UniformField:
-    if not isinstance(field, UniformField):
+    if (uniform := field.uniform) is None:
         raise InputError(
             f"the study {study!r} must have a uniform field in mT; instead received a "
             "magnet: vary its gap_mm with the command shape"
         )
-    return field
+    return uniform
 
 
 def _field(specimen: Specimen, field: UniformField | MagnetField, value: str) -> Case:

@@ -1,4 +1,4 @@
-"""From specimens and fields to the dimensionless arrays of the planar kernels."""
+"""From specimens to the dimensionless arrays of the planar kernels."""
 
 from __future__ import annotations
 
@@ -10,17 +10,15 @@ from typing import ParamSpec
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.checks import whole
-from ..core.cross_section import SIZES
-from ..core.errors import InputError
-from ..core.jit import njit
-from ..core.magnet import Magnet
-from ..core.specimen import Specimen
-from ..core.units import MU0, T_from_mT
-from .fields import FLUX_LIMIT_T, Field, MagnetField, Support, UniformField
-from .magnet.field import magnet_block
-from .magnet.flux import CUBOID, PART, UNIFORM, WIDTH
-from .planar.march import WX, WY, E, H, M
+from ...core.checks import whole
+from ...core.cross_section import SIZES
+from ...core.errors import InputError
+from ...core.jit import njit
+from ...core.specimen import Specimen
+from ...core.units import MU0
+from ..fields import FLUX_LIMIT_T, Support
+from ..magnet.flux import PART
+from ..planar.march import WX, WY, E, H, M
 
 Array = NDArray[np.float64]
 P = ParamSpec("P")
@@ -130,61 +128,6 @@ def checked_density(specimen: Specimen, support: Support) -> float:
             "weight to be taken into account; instead received none"
         )
     return specimen.density_kg_m3
-
-
-@array_cache(maxsize=1024)
-def field_array(field: Field, length_mm: float) -> Array:
-    """Return the field as the kernels take it (see `planar.march`)."""
-    out = np.zeros(WIDTH)
-    if isinstance(field, UniformField):
-        out[0] = UNIFORM
-        out[1:3] = direction(np.array(field.angle_deg))
-        out[1:3] *= T_from_mT(field.flux_mT)
-    elif isinstance(field, MagnetField):
-        out[0] = CUBOID
-        block = magnet_block(field.magnet, length_mm=length_mm, gap_mm=field.gap_mm)
-        block[:6] /= length_mm
-        out[1:] = block
-    else:
-        raise InputError(
-            "field must be a UniformField in mT or a MagnetField in mm; instead "
-            f"received {type(field).__name__}"
-        )
-    return out
-
-
-def direction(angle_deg: Array) -> tuple[Array, Array]:
-    """Return cosine and sine of angles in degrees, with exact zeros at right angles.
-
-    Rounding would make a straight rod bend there.
-    """
-    angle = np.radians(angle_deg)
-    cosine, sine = np.cos(angle), np.sin(angle)
-    right = np.mod(angle_deg, 90.0) == 0.0
-    if np.any(right):
-        cosine = np.where(right, np.rint(cosine), cosine)
-        sine = np.where(right, np.rint(sine), sine)
-    return cosine, sine
-
-
-def many_uniform_fields(flux_T: Array, angle_deg: Array) -> Array:
-    """Return uniform fields as the kernels take them, shape (n, 17)."""
-    fields = np.zeros((len(flux_T), WIDTH))
-    cosine, sine = direction(angle_deg)
-    fields[:, 1] = flux_T * cosine
-    fields[:, 2] = flux_T * sine
-    return fields
-
-
-def many_magnet_fields(magnet: Magnet, gap_mm: Array, length_mm: Array) -> Array:
-    """Return one magnet before many rods as the kernels take it, shape (n, 17)."""
-    fields = np.empty((len(gap_mm), WIDTH))
-    fields[:, 0] = CUBOID
-    fields[:, 1:] = magnet_block(magnet, length_mm=0.0, gap_mm=0.0)
-    fields[:, 4:7] -= gap_mm[:, None] * np.array(magnet.axes()[2])
-    fields[:, 4] += length_mm
-    fields[:, 1:7] /= length_mm[:, None]
-    return fields
 
 
 def many_rods(
