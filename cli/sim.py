@@ -43,7 +43,7 @@ def shape(
     angle_deg: Annotated[
         float, typer.Option(help="Direction of the uniform field from +x, in deg.")
     ] = 90.0,
-    magnet: Annotated[Path | None, typer.Option(help="Magnet file (TOML).")] = None,
+    magnet: Annotated[Path | None, typer.Option(help="Magnet or [[source]] file (TOML).")] = None,
     gap_mm: Annotated[
         float | None, typer.Option(help="From the N face to the undeformed tip, in mm.")
     ] = None,
@@ -130,7 +130,7 @@ def _specimen(
 def _field(
     field_mT: float | None, angle_deg: float, file: Path | None, gap_mm: float | None
 ) -> Field:
-    from ..sim.fields import MagnetField, UniformField
+    from ..sim.fields import UniformField
 
     if (field_mT is None) == (file is None):
         raise typer.BadParameter("give either --field-mT B or --magnet FILE")
@@ -138,11 +138,16 @@ def _field(
         if gap_mm is not None:
             raise typer.BadParameter("--gap-mm belongs to --magnet")
         return UniformField(flux_mT=field_mT, angle_deg=angle_deg)
-    if gap_mm is None:
-        raise typer.BadParameter("--magnet needs --gap-mm D")
-    from ..core.specimen_file import read_magnet
+    from ..sim.sources import read_field
 
-    return MagnetField(magnet=read_magnet(Path(str(file))), gap_mm=gap_mm)
+    field = read_field(Path(str(file)))
+    if field.follows_gap and gap_mm is None:
+        raise typer.BadParameter("--magnet needs --gap-mm D")
+    if gap_mm is None:
+        return field
+    if not field.follows_gap:
+        raise typer.BadParameter("--gap-mm: all sources of the file have their place")
+    return field.at_gap(gap_mm)
 
 
 def _summary(rod: Specimen, model: str, solution: Solution) -> dict[str, Any]:

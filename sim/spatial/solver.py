@@ -253,7 +253,8 @@ def _flux_array(field: Field | Sequence[float], length_mm: float) -> Array:
         return field_array(
             as_field(field, "or three floats (x, y, z) in mT"), length_mm
         )
-    flux_mT = vector(field, "flux_mT", "mT", FLUX_LIMIT_T * 1e3)  # type: ignore[arg-type]
+    what = "flux_mT (a field, or three floats)"
+    flux_mT = vector(field, what, "mT", FLUX_LIMIT_T * 1e3)  # type: ignore[arg-type]
     out = np.zeros(WIDTH)
     out[1:4] = np.array(flux_mT) * 1e-3
     return out

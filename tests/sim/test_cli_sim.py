@@ -77,6 +77,8 @@ def test_pulled_in_has_no_shape_to_write(tmp_path: Path) -> None:
     )
     magnet = tmp_path / "magnet.toml"
     magnet.write_text("side_mm = 55.0\nremanence_T = 1.305\n")
+    without = ["shape", "--specimen", str(rod), "--magnet", str(magnet)]
+    assert RUN.invoke(sim.app, without).exit_code == 2
     case = ("shape", "--specimen", str(rod), "--magnet", str(magnet), "--gap-mm", "20")
     assert "pulled in: no equilibrium" in run(*case)
     out = tmp_path / "shape.csv"
@@ -92,7 +94,6 @@ def test_pulled_in_has_no_shape_to_write(tmp_path: Path) -> None:
         ("--gmc", "2"),
         ("--gmc", "2", "--specimen", "x.toml", "--field-mT", "5"),
         ("--gmc", "2", "--field-mT", "5", "--magnet", "m.toml"),
-        ("--gmc", "2", "--magnet", "m.toml"),
         ("--gmc", "2", "--field-mT", "5", "--gap-mm", "5"),
         ("--gmc", "2", "--field-mT", "5", "--points", "3"),
         ("--gmc", "two", "--field-mT", "5"),
