@@ -43,7 +43,9 @@ def shape(
     angle_deg: Annotated[
         float, typer.Option(help="Direction of the uniform field from +x, in deg.")
     ] = 90.0,
-    magnet: Annotated[Path | None, typer.Option(help="Magnet or [[source]] file (TOML).")] = None,
+    magnet: Annotated[
+        Path | None, typer.Option(help="Magnet or source file (TOML).")
+    ] = None,
     gap_mm: Annotated[
         float | None, typer.Option(help="From the N face to the undeformed tip, in mm.")
     ] = None,
