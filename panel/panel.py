@@ -56,6 +56,7 @@ class Panel:
         )
         self.field = FieldWatch(self)
         self.supervisor = Supervisor(workspace, self.hub.changed)
+        self.supervisor.over = self.connect
         self.jobs = Jobs(workspace, self.hub.changed)
         self._number = 0
         self._after_s = 0.0
@@ -66,10 +67,10 @@ class Panel:
     def begin(self) -> None:
         """Start the threads and open the bench, if there is a rig file."""
         self._begun.set()
+        self.supervisor.begin()
         self.owner.begin()
         self.sight.begin()
         self.field.begin()
-        self.supervisor.begin()
         self.connect()
 
     def connect(self) -> None:

@@ -23,6 +23,8 @@ FLAGS = {
 }
 """What a flag means, and what to do."""
 
+_LINE_POINTS = 40
+
 DERIVED = {
     "extract": "centrelines.csv",
     "compare": "comparison.csv",
@@ -101,10 +103,18 @@ def run_detail(workspace: Workspace, name: str) -> dict[str, Any]:
         "planned": len(gaps),
         "gaps_mm": gaps,
         "steps": [_step(step) for step in run.steps],
-        "model_mT": [[gap, flux_mT(files, gap)] for gap in gaps],
+        "model_mT": [[gap, flux_mT(files, gap)] for gap in _between(gaps)],
         "has": derived(folder),
         "fit": _fit(folder),
     }
+
+
+def _between(gaps_mm: list[float]) -> list[float]:
+    """Return gaps along which the model's line is drawn."""
+    if not gaps_mm:
+        return []
+    low, high = min(gaps_mm), max(gaps_mm)
+    return [low + (high - low) * i / _LINE_POINTS for i in range(_LINE_POINTS + 1)]
 
 
 def _step(step: dict[str, Any]) -> dict[str, Any]:

@@ -53,7 +53,10 @@ class Supervisor:
         self.over: Callable[[], None] = lambda: None
 
     def begin(self) -> None:
-        """Start the thread."""
+        """See whether a run has the bench, and start the thread."""
+        if self._workspace.files().rig is not None:
+            with contextlib.suppress(MagbendError):
+                self._facts = self._status()
         self._thread.start()
 
     def close(self) -> None:
@@ -166,12 +169,25 @@ class Supervisor:
             self._look_now.wait(LOOK_S)
             self._look_now.clear()
 
+    def _status(self) -> dict[str, Any] | None:
+        """Return what the owner of the bench tells; None if that is ourselves.
+
+        Raises
+        ------
+        NobodyError
+            If nobody owns it.
+        """
+        from ...rig import ask
+
+        facts = ask(self._workspace.rig_path, "status", port=self._port())
+        return None if facts.get("pid") == os.getpid() else facts
+
     def _follow(self) -> None:
         """Take in what the owner of the bench tells, until it is over."""
-        from ...rig import ask, watch
+        from ...rig import watch
 
         path, port = self._workspace.rig_path, self._port()
-        if ask(path, "status", port=port).get("pid") == os.getpid():
+        if self._status() is None:
             return
         for facts in watch(path, port=port):
             if facts.get("pid") == os.getpid() or self._ending.is_set():

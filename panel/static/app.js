@@ -4,8 +4,9 @@ import {h, fill, say} from "./dom.js";
 import {client, command, connect, isLost, link, on, watchPicture} from "./link.js";
 import * as bench from "./bench.js";
 import * as run from "./run.js";
+import * as runs from "./runs.js";
 
-const pages = {bench, run};
+const pages = {bench, run, runs};
 const $ = (id) => document.getElementById(id);
 let current = "";
 
