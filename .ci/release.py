@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import tomllib
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -44,6 +45,7 @@ def join_changes(version: str) -> None:
     for kind, title in KINDS.items():
         paths = sorted((ROOT / "changes").glob(f"*.{kind}.md"))
         said = [path.read_text(encoding="utf-8").strip() for path in paths]
+        said = [text if text.startswith(("-", "*")) else f"- {text}" for text in said]
         if said:
             lines += [f"### {title}", "", *said, ""]
         for path in paths:
@@ -55,10 +57,13 @@ def join_changes(version: str) -> None:
 
 def pin_with_hashes() -> None:
     """Write requirements.txt: every dependency of every extra, with its digests."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    extras = set(project["project"]["optional-dependencies"]) - {"all"}  # is the others
     run(
         sys.executable, "-m", "piptools", "compile", "--quiet", "--generate-hashes",
         "--no-emit-index-url", "--no-emit-find-links", "--no-header", "--strip-extras",
-        "--all-extras", "--constraint", "constraints.txt",
+        *(f"--extra={name}" for name in sorted(extras)),
+        "--constraint", "constraints.txt",
         "--output-file", "requirements.txt", "pyproject.toml",
     )  # fmt: skip
 
