@@ -22,6 +22,10 @@ app = group(
     "magbend vision extract photo.png --calibration calibration.json --out measured",
 )
 
+LINEAR = typer.Option(
+    None, "--linear/--no-linear",
+    help="Values of the files are proportional to light; default: the curve of sRGB.",
+)  # fmt: skip
 _BOARD = typer.Option("7x5", "--board", help="Squares across and down.")
 _SQUARE = typer.Option(10.0, "--square-mm", help="Side of a square, as designed.")
 _MARKER = typer.Option(7.5, "--marker-mm", help="Side of a marker, as designed.")
@@ -97,6 +101,7 @@ def calibrate(
     scale_mm_per_px: float = typer.Option(
         None, "--scale-mm-per-px", help="No board: the scale itself."
     ),
+    linear: bool = LINEAR,
     json_output: bool = JSON,
 ) -> None:  # fmt: skip
     """Calibrate a camera from photographs of the board."""
@@ -120,8 +125,8 @@ def calibrate(
             legacy=legacy, plain=bool(chessboard),
         )  # fmt: skip
         result = calibrate_photos(
-            read_photo(plane),
-            [read_photo(path) for path in lens or []],
+            read_photo(plane, linear=linear),
+            [read_photo(path, linear=linear) for path in lens or []],
             board=design,
             rod_height_mm=rod_height_mm,
             camera_height_mm=camera_height_mm,
@@ -191,6 +196,7 @@ def extract(
     overlays: bool = typer.Option(
         True, "--overlays/--no-overlays", help="Draw what was found."
     ),
+    linear: bool = LINEAR,
     workers: int = typer.Option(0, "--workers", min=0, help="Processes; 0: by itself."),
     resume: bool = typer.Option(
         False, "--resume", help="Keep what is measured already, with these settings."
@@ -220,6 +226,7 @@ def extract(
         invert=invert,
         joints_mm=_numbers(joints_mm),
         clamp="none" if free else "auto",
+        linear=linear,
     )
     for path in (edges, figure_steps):
         if path is not None:
@@ -400,7 +407,7 @@ def _setting(
         _below_the_camera(given["rod_height_mm"], known.camera_height_mm)
     return Setting(
         calibration=known,
-        bare=None if bare is None else read_bare(bare),
+        bare=None if bare is None else read_bare(bare, linear=others.get("linear")),
         **given,
         **others,
     )

@@ -55,6 +55,9 @@ from .camera.calibration_file import (
 from .camera.calibration_file import (
     write_calibration as write_calibration,
 )
+from .camera.oriented import (
+    oriented as oriented,
+)
 from .extraction.bare import (
     read_bare as read_bare,
 )

@@ -5,12 +5,15 @@ from __future__ import annotations
 import base64
 from collections.abc import Sequence
 from html import escape
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...vision.camera.calibration import specimen_to_px
+from ...core.errors import MagbendError
+from ...vision import Calibration, oriented, read_photo, specimen_to_px
+from ...vision.picture.srgb import encode_srgb
 from ..compare.compare import Comparison, RunComparison
 
 Array = NDArray[np.float64]
@@ -51,7 +54,7 @@ def photograph_svg(
     path = run.run.path / "images" / first.step.image
     if not first.step.image or not path.is_file():
         return ""
-    picture = cv2.imdecode(np.fromfile(path, dtype=np.uint8), cv2.IMREAD_COLOR)
+    picture = _picture(path, run.run.calibration)
     if picture is None:
         return ""
     lines = _lines(run, comparisons)
@@ -74,6 +77,18 @@ def photograph_svg(
     ]
     parts += [_polyline(name, points) for name, points in lines]
     return "".join([*parts, "</svg>"])
+
+
+def _picture(path: Path, calibration: Calibration | None) -> NDArray[np.uint8] | None:
+    """Return a photograph as it was measured: upright, or as its camera's board."""
+    try:
+        photo = read_photo(path, linear=False)
+        if calibration is not None:
+            photo = oriented(photo, calibration)
+    except MagbendError:
+        return None
+    colour = photo.colour()
+    return encode_srgb(photo.grey if colour is None else colour)
 
 
 def _lines(

@@ -14,9 +14,28 @@ import cv2
 import numpy as np
 
 from ...core.errors import VisionError
+from ..picture.header import count_pages
 from ..picture.photo import Photo, as_photo, read_photo, refuse_special
 
-PICTURES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp"})
+PICTURES = frozenset(
+    (
+        ".png",
+        ".jpg",
+        ".jpeg",
+        ".tif",
+        ".tiff",
+        ".bmp",
+        ".webp",
+        ".avif",
+        ".heic",
+        ".heif",
+    )
+)
+UNREADABLE = frozenset(
+    (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".gif", ".psd",
+     ".xcf", ".jp2", ".jxl", ".pdf")
+)  # fmt: skip
+"""Pictures that are not read: named in a row of their own, never left out silently."""
 VIDEOS = frozenset({".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm"})
 
 
@@ -67,7 +86,7 @@ def list_sources(paths: Iterable[Path]) -> list[Source]:
             refuse_special(path)
             sources.extend(_of_video(path))
         else:
-            sources.append(Source(image=path.name, path=path))
+            sources.extend(_of_picture(path))
     if not sources:
         raise VisionError(
             "at least one photograph must be given; instead received none"
@@ -82,7 +101,7 @@ def _of_folder(folder: Path) -> list[Source]:
         sorted(
             path
             for path in within.iterdir()
-            if path.suffix.lower() in PICTURES
+            if path.suffix.lower() in PICTURES | UNREADABLE
             and not path.name.startswith(".")
             and not path.is_dir()
         )
@@ -92,7 +111,18 @@ def _of_folder(folder: Path) -> list[Source]:
     if not found:
         raise VisionError(f"{within}: this folder has no photographs")
     run = folder.resolve() if is_run else None
-    return [Source(image=path.name, path=path, run=run) for path in found]
+    return [source for path in found for source in _of_picture(path, run)]
+
+
+def _of_picture(path: Path, run: Path | None = None) -> list[Source]:
+    """Return a picture, or each page of a TIFF with several."""
+    pages = count_pages(path)
+    if pages < 2:
+        return [Source(image=path.name, path=path, run=run)]
+    return [
+        Source(image=f"{path.stem}_{page:06d}", path=path, frame=page, run=run or path)
+        for page in range(pages)
+    ]
 
 
 def _of_video(path: Path) -> list[Source]:
@@ -138,16 +168,22 @@ def _stem(source: Source) -> str:
     return source.image if source.frame is not None else Path(source.image).stem
 
 
-def read_source(source: Source) -> Photo:
-    """Read one picture.
+def read_source(source: Source, *, linear: bool | None = None) -> Photo:
+    """Read one picture; `linear` as for `read_photo`.
 
     Raises
     ------
     VisionError
         If it cannot be read.
     """
-    if source.frame is None:
-        return read_photo(source.path)
+    ending = source.path.suffix.lower()
+    if ending in UNREADABLE:
+        raise VisionError(
+            f"{source.path.name}: {ending[1:].upper()} is not read; convert it to PNG, "
+            "TIFF or JPEG"
+        )
+    if ending not in VIDEOS:
+        return read_photo(source.path, linear=linear, page=source.frame or 0)
     video = _video(source.path)
     if not video.opened:
         raise VisionError(

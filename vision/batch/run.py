@@ -19,6 +19,7 @@ import cv2
 from ...core.errors import MagbendError, VisionError
 from ...core.files import output_file, output_folder, write_bytes
 from ...core.progress import Progress, silent
+from ..camera.oriented import oriented
 from ..extraction.extract import measure
 from ..extraction.setting import Setting
 from ..measurement import failure
@@ -147,7 +148,9 @@ class _Task:
         photo = None
         try:
             sha256 = digest(source)
-            photo = read_source(source)
+            photo = read_source(source, linear=self.setting.linear)
+            if self.setting.calibration is not None:
+                photo = oriented(photo, self.setting.calibration)
             measurement = measure(photo, self.setting)
         except (MagbendError, OSError) as error:
             measurement = failure("unreadable", str(error))

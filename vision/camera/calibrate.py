@@ -13,6 +13,7 @@ from ...core.checks import finite, positive
 from ...core.errors import InputError, VisionError
 from ..picture.photo import Photo
 from ..picture.srgb import encode_srgb
+from ..picture.turn import turned
 from .board import Board, find_corners
 from .bundle import Bundle, Corners, default_prior, fit_bundle
 from .calibration import Calibration, View, scale_calibration
@@ -91,7 +92,9 @@ def calibrate(
     first = _see(plane, board, plane.size_px)
     if first.corners is None:
         raise VisionError(f"{plane.source}: {first.why_not}")
-    others = [_see(photo, board, plane.size_px) for photo in lens]
+    others = [
+        _see(turned(photo, plane.orientation), board, plane.size_px) for photo in lens
+    ]
     seen = [first, *others]
     used = [i for i, one in enumerate(seen) if one.corners is not None]
 
@@ -174,6 +177,7 @@ def _calibration(
         print_scale=board.print_scale,
         board=board.describe(),
         views=views,
+        orientation=plane.orientation,
     )
     height = calibration.camera_height_mm
     if height <= 0.0:

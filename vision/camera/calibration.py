@@ -69,6 +69,8 @@ class Calibration:
         Measured over nominal length of the printed board, as it was taken into account.
     board, views : str, tuple of View
         The board as a sentence, and each photograph with its verdict.
+    orientation : int or None
+        EXIF's 1 to 8 of the plane photograph (see `oriented`); None where unknown.
     """
 
     image_size_px: tuple[int, int]
@@ -85,6 +87,7 @@ class Calibration:
     print_scale: float = 1.0
     board: str = ""
     views: tuple[View, ...] = ()
+    orientation: int | None = None
 
     def __post_init__(self) -> None:
         for name, shape in (("rotation", (3, 3)), ("translation_mm", (3,))):
@@ -102,6 +105,11 @@ class Calibration:
                 "calibration rotation must be a rotation matrix; instead its product "
                 f"with its transpose differs from the unit matrix by {error:.2g}"
             )
+
+    @property
+    def is_scale_alone(self) -> bool:
+        """Whether nothing but a scale is known: no lens, no tilt, no height."""
+        return self.camera_height_source == NO_PARALLAX
 
     @property
     def camera(self) -> Camera:

@@ -49,6 +49,7 @@ class CalibrationModel(FileModel):
     print_scale: float = 1.0
     board: str = ""
     views: tuple[ViewModel, ...] = ()
+    orientation: Annotated[int, Field(ge=1, le=8)] | None = None
 
 
 def write_calibration(calibration: Calibration, path: Path) -> None:
@@ -77,6 +78,7 @@ def write_calibration(calibration: Calibration, path: Path) -> None:
             }
             for view in calibration.views
         ],
+        "orientation": calibration.orientation,
     }  # fmt: skip
     write_json(path, data)
 
@@ -122,6 +124,7 @@ def _calibration(model: CalibrationModel) -> Calibration:
             )
             for view in model.views
         ),
+        orientation=model.orientation,
     )
 
 

@@ -11,9 +11,10 @@ import numpy as np
 from ...core.errors import VisionError
 from ..edge.state import LostError
 from ..picture.photo import Photo, read_photo
+from ..picture.turn import turned
 
 
-def read_bare(path: Path) -> Photo:
+def read_bare(path: Path, *, linear: bool | None = None) -> Photo:
     """Read the photograph of the bare scene.
 
     Raises
@@ -21,7 +22,7 @@ def read_bare(path: Path) -> Photo:
     VisionError
         If it cannot be read or is dark.
     """
-    photo = read_photo(path)
+    photo = read_photo(path, linear=linear)
     if float(np.median(photo.grey)) < 0.02:
         raise VisionError(f"{path}: the bare frame must show lit paper; it is dark")
     return photo
@@ -29,6 +30,7 @@ def read_bare(path: Path) -> Photo:
 
 def flattened(photo: Photo, bare: Photo) -> Photo:
     """Return a photograph with its light divided by that of the bare scene."""
+    bare = turned(bare, photo.orientation)
     if bare.size_px != photo.size_px:
         raise LostError(
             "bare_mismatch",

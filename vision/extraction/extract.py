@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import MagbendError
 from ..camera.calibration import Calibration
+from ..camera.oriented import oriented
 from ..edge.state import LostError
 from ..find.choose import find_rod, search_rod
 from ..find.ground import View
@@ -70,6 +71,7 @@ def measure(photo: Photo, setting: Setting) -> Measurement:
     """
     try:
         if setting.calibration is not None:
+            photo = oriented(photo, setting.calibration)
             setting.calibration.check_size(*photo.size_px)
         if setting.bare is not None:
             photo = flattened(photo, setting.bare)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ...core.errors import MagbendError
+from ..camera.oriented import oriented
 from ..edge.state import LostError, Root
 from ..find.ground import View, mixed
 from ..find.rod import Candidate
@@ -82,6 +83,7 @@ def _near(photo: Photo, setting: Setting, last: Measurement) -> Measurement | No
         root=_root(last), contacts=1, ratio=0.0,
     )  # fmt: skip
     if setting.calibration is not None:
+        photo = oriented(photo, setting.calibration)
         setting.calibration.check_size(*photo.size_px)
     if setting.bare is not None:
         photo = flattened(photo, setting.bare)

@@ -47,6 +47,8 @@ class Setting:
         looks over the clamp so that it hides the root (flag ``root_hidden``).
     bare : Photo or None
         The same scene without rod and clamp: its light is divided out.
+    linear : bool or None
+        Whether the values of the files are proportional to light (`read_photo`).
     """
 
     calibration: Calibration | None = None
@@ -58,6 +60,7 @@ class Setting:
     clamp: Clamp = "auto"
     clamp_height_mm: float | None = None
     bare: Photo | None = None
+    linear: bool | None = None
 
     @property
     def axis_height_mm(self) -> float:

@@ -8,7 +8,6 @@ this module sees grey values proportional to light, paper about 0.7, black about
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
@@ -20,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import VisionError
-from ...core.jpeg import is_damaged
+from .header import HEIF, Header, by_profile, decode_heif, read_header
+from .whole import MAX_PIXELS, PNG, check_whole
 
-MAX_PIXELS = 64_000_000
 MIN_SIDE = 16
 
 
@@ -39,6 +38,9 @@ class Photo:
         Name for messages and tables.
     clipped : float
         Fraction of pixels at the top of the scale.
+    orientation : int
+        EXIF's 1 to 8, as the file notes it: how the sensor's picture was turned to be
+        upright, as it is here; see `turn`.
     decode : callable, optional
         Gives the pixels in colour, as `as_photo` takes them; see `colour`.
     """
@@ -46,6 +48,7 @@ class Photo:
     grey: NDArray[np.float32]
     source: str = "array"
     clipped: float = 0.0
+    orientation: int = 1
     decode: Callable[[], NDArray[Any]] | None = field(
         default=None, repr=False, compare=False
     )
@@ -68,19 +71,22 @@ class Photo:
         return int(self.grey.shape[1]), int(self.grey.shape[0])
 
 
-def read_photo(path: Path | str, *, linear: bool = False) -> Photo:
-    """Read a picture file (PNG, JPEG, TIFF, BMP ...; 8 or 16 bit, grey or colour).
+def read_photo(path: Path | str, *, linear: bool | None = None, page: int = 0) -> Photo:
+    """Read a picture file (PNG, JPEG, TIFF, BMP, HEIC ...; 8 or 16 bit).
 
     The orientation that a camera notes in EXIF is applied; transparent pixels are laid
-    on white.
+    on white; a colour profile with another curve than that of sRGB is undone.
 
     Parameters
     ----------
     path : Path or str
         The file.
-    linear : bool
+    linear : bool or None
         True for pictures whose values are proportional to light already (raw or
-        machine-vision files); otherwise the sRGB curve is undone.
+        machine-vision files), False for such with the sRGB curve. None takes the curve
+        for granted, but not where 10, 12 or 14 bits lie in a file of 16.
+    page : int
+        Which picture of a TIFF with several.
 
     Raises
     ------
@@ -95,7 +101,7 @@ def read_photo(path: Path | str, *, linear: bool = False) -> Photo:
         raise VisionError(f"{path}: there is no such file") from None
     except OSError as error:
         raise VisionError(f"{path}: cannot be read: {error.strerror}") from None
-    return decode_photo(data, source=path.name, linear=linear)
+    return decode_photo(data, source=path.name, linear=linear, page=page)
 
 
 def refuse_special(path: Path) -> None:
@@ -110,7 +116,9 @@ def refuse_special(path: Path) -> None:
         raise VisionError(f"{path}: cannot be read: it is a folder or pipe, not a file")
 
 
-def decode_photo(data: bytes, *, source: str = "data", linear: bool = False) -> Photo:
+def decode_photo(
+    data: bytes, *, source: str = "data", linear: bool | None = None, page: int = 0
+) -> Photo:
     """Decode the bytes of a picture file; see `read_photo`.
 
     Raises
@@ -120,20 +128,67 @@ def decode_photo(data: bytes, *, source: str = "data", linear: bool = False) -> 
     """
     if not data:
         raise VisionError(f"{source}: the file is empty; copy it from the camera again")
-    _check_whole(data, source)
-    pixels = _decode(data, source, cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH)
-    if data[:8] == _PNG and data[25] in (4, 6):
-        pixels = _with_alpha(data, source, pixels)
-    photo = as_photo(pixels, source=source, linear=linear)
+    if data[4:12] in HEIF:
+        pixels, orientation = decode_heif(data, source)
+        return replace(as_photo(pixels, source=source), orientation=orientation)
+    check_whole(data, source)
+    header = read_header(data)
+    pixels = _pixels(data, source, header, linear, page)
+    photo = as_photo(pixels, source=source, linear=bool(linear))
+    photo = replace(photo, orientation=header.orientation)
     if linear or pixels.ndim != 2:  # transparent pixels are white there
         return replace(photo, decode=None)
     flags = cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH
     return replace(photo, decode=partial(_decode, data, source, flags))
 
 
-def _decode(data: bytes, source: str, flags: int) -> NDArray[Any]:
+def _pixels(
+    data: bytes, source: str, header: Header, linear: bool | None, page: int
+) -> NDArray[Any]:
+    """Return the pixels, grey where that is all that is needed, in their full range."""
+    if header.profile and not linear:
+        flags = cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH
+        return by_profile(_decode(data, source, flags, page), header, source)
+    flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH
+    pixels = _decode(data, source, flags, page)
+    if data[:8] == PNG and data[25] in (4, 6):
+        pixels = _with_alpha(data, source, pixels)
+    if pixels.dtype != np.uint16:
+        return pixels
+    if header.white_is_zero:
+        pixels = np.iinfo(np.uint16).max - pixels
+    return pixels << _spare_bits(pixels, source, linear)
+
+
+def _spare_bits(pixels: NDArray[Any], source: str, linear: bool | None) -> int:
+    """Return how many of the 16 bits the camera left empty.
+
+    Raises
+    ------
+    VisionError
+        If some are empty, and nobody said whether the values are light.
+    """
+    top = int(pixels.max(initial=0))
+    bits = next((bits for bits in (10, 12, 14) if top < 2**bits), 16)
+    if bits == 16 or top < 256:  # full, or black
+        return 0
+    if linear is None:
+        raise VisionError(
+            f"{source}: holds no value above {2**bits - 1}: {bits} bits in a 16-bit "
+            "file; say --linear if its values are proportional to light (a machine "
+            "vision camera), or --no-linear if they carry the curve of a photograph"
+        )
+    return 16 - bits
+
+
+def _decode(data: bytes, source: str, flags: int, page: int = 0) -> NDArray[Any]:
+    coded = np.frombuffer(data, np.uint8)
     try:
-        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), flags)
+        if page:
+            found, pages = cv2.imdecodemulti(coded, flags, range=(page, page + 1))
+            pixels = pages[0] if found and pages else None
+        else:
+            pixels = cv2.imdecode(coded, flags)
     except cv2.error:
         pixels = None
     if pixels is None:
@@ -206,11 +261,6 @@ def _linear(values: NDArray[Any], *, linear: bool) -> NDArray[np.float32]:
     return np.ascontiguousarray(values, dtype=np.float32)
 
 
-_PNG = b"\x89PNG\r\n\x1a\n"
-_JPEG = b"\xff\xd8"
-_DAMAGED = "{source}: the picture is cut off or damaged; copy it from the camera again"
-
-
 @cache
 def _table(bits: int, linear: bool) -> NDArray[np.float32]:
     """Light of each code: the sRGB curve of IEC 61966-2-1, or a straight line."""
@@ -250,62 +300,3 @@ def _on_white(pixels: NDArray[Any]) -> NDArray[Any]:
         return grey
     mixed = grey * opaque + top * (1.0 - opaque)
     return np.asarray(mixed if top == 1.0 else np.rint(mixed)).astype(pixels.dtype)
-
-
-def _check_whole(data: bytes, source: str) -> None:
-    """Refuse what decoders patch up: PNG and JPEG files that are cut off or damaged."""
-    if data[:8] == _PNG:
-        size, whole = _png_size(data), _png_whole(data)
-    elif data[:2] == _JPEG:
-        size = _jpeg_size(data)
-        whole = data.rfind(b"\xff\xd9") > data.rfind(b"\xff\xda") > 0
-        whole = whole and not is_damaged(data)
-    else:
-        return
-    if size is None or not whole:
-        raise VisionError(_DAMAGED.format(source=source))
-    if size[0] * size[1] > MAX_PIXELS:
-        raise VisionError(
-            f"{source}: a photograph must have at most {MAX_PIXELS / 1e6:.0f} "
-            f"megapixels; instead received {size[0]} x {size[1]} px"
-        )
-
-
-def _png_size(data: bytes) -> tuple[int, int] | None:
-    if len(data) < 33 or data[12:16] != b"IHDR":
-        return None
-    width, height = struct.unpack(">II", data[16:24])
-    return width, height
-
-
-def _png_whole(data: bytes) -> bool:
-    """Walk the chunks to IEND, as the file's own lengths tell."""
-    place = 8
-    while place + 12 <= len(data):
-        (length,) = struct.unpack(">I", data[place : place + 4])
-        if place + 12 + length > len(data):
-            return False
-        if data[place + 4 : place + 8] == b"IEND":
-            return True
-        place += 12 + length
-    return False
-
-
-def _jpeg_size(data: bytes) -> tuple[int, int] | None:
-    """Find the frame header (SOFn) among the segments."""
-    place = 2
-    while place + 9 < len(data):
-        if data[place] != 0xFF:
-            return None
-        marker = data[place + 1]
-        if marker == 0xFF:
-            place += 1
-            continue
-        if 0xC0 <= marker <= 0xCF and marker not in (0xC4, 0xC8, 0xCC):
-            height, width = struct.unpack(">HH", data[place + 5 : place + 9])
-            return width, height
-        if marker == 0xDA:
-            return None
-        (length,) = struct.unpack(">H", data[place + 2 : place + 4])
-        place += 2 + length
-    return None

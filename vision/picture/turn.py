@@ -1,0 +1,62 @@
+"""Photographs turned as another photograph of the same camera was turned.
+
+A camera notes in EXIF how its picture is to be turned to be upright, by its gravity
+sensor; looking straight down that is chance. Photographs are shown upright, but a lens
+and a calibration belong to the sensor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .photo import Photo
+
+_BACK = {6: 8, 8: 6}
+"""Orientations that are not their own inverse."""
+
+
+def turned(photo: Photo, orientation: int) -> Photo:
+    """Return an upright photograph turned as one of another EXIF orientation would be.
+
+    Parameters
+    ----------
+    photo : Photo
+        Upright, of the orientation that its file notes.
+    orientation : int
+        EXIF's 1 to 8 of the photograph to agree with.
+    """
+    own = photo.orientation
+    if own == orientation:
+        return photo
+    decode = photo.decode
+    return replace(
+        photo,
+        grey=np.ascontiguousarray(_as_sensor(photo.grey, own, orientation)),
+        orientation=orientation,
+        decode=None if decode is None else partial(_decoded, decode, own, orientation),
+    )
+
+
+def _decoded(decode: Any, own: int, other: int) -> NDArray[Any]:
+    return np.ascontiguousarray(_as_sensor(decode(), own, other))
+
+
+def _as_sensor(pixels: NDArray[Any], own: int, other: int) -> NDArray[Any]:
+    """Turn back to the sensor's picture, and on as the other orientation asks."""
+    return _upright(_upright(pixels, _BACK.get(own, own)), other)
+
+
+def _upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
+    """Turn and mirror as EXIF asks."""
+    if orientation in (5, 6, 7, 8):
+        pixels = np.swapaxes(pixels, 0, 1)
+    if orientation in (3, 4, 7, 8):
+        pixels = pixels[::-1]
+    if orientation in (2, 3, 6, 7):
+        pixels = pixels[:, ::-1]
+    return pixels
