@@ -41,6 +41,7 @@ class Row:
     length: float = np.nan
     width: float = np.nan
     pull: float = np.nan
+    pulls: tuple[float, ...] = ()
 
     @property
     def wrong(self) -> bool:
@@ -61,6 +62,8 @@ def measured(case: Case) -> Row:
     line, pose = case.scene.centreline, case.scene.clamp.pose
     points = np.column_stack([found.points["x_mm"], found.points["y_mm"]])
     distance = signed_distance(points, line.points_mm)
+    clamp = found.pose.from_board(np.array([[pose.x_mm, pose.y_mm]]))[0]
+    off = np.array(found.tip_mm) - line.tip_mm
     turn = (found.pose.angle_deg - pose.angle_deg + 180.0) % 360.0 - 180.0
     return Row(
         case=case, found=found,
@@ -69,6 +72,13 @@ def measured(case: Case) -> Row:
         length=abs(found.length_mm - line.length_mm),
         width=abs(found.width_mm - case.scene.side_mm),
         pull=turn / found.clamp_angle_sd_deg,
+        pulls=(
+            (found.length_mm - line.length_mm) / found.length_sd_mm,
+            off[0] / found.tip_sd_mm[0],
+            off[1] / found.tip_sd_mm[1],
+            (found.width_mm - case.scene.side_mm) / found.width_sd_mm,
+            clamp[0] / found.clamp_sd_mm,
+        ),
     )  # fmt: skip
 
 
@@ -99,6 +109,17 @@ def table(rows: list[Row]) -> str:
             f"{np.sqrt(np.mean(pull**2)):6.2f} {100 * np.mean(np.abs(pull) < 1):4.0f}%"
         )
     return "\n".join(lines)
+
+
+def coverage(rows: list[Row]) -> str:
+    """Return how many errors lie within one stated deviation, of each quantity."""
+    pulls = np.array([row.pulls for row in rows if row.found.ok])
+    names = ("length", "tip x", "tip y", "width", "clamp place")
+    return "\n".join(
+        f"{name}: {100 * np.mean(np.abs(pull) < 1):.0f} % within one stated deviation, "
+        f"z RMS {np.sqrt(np.mean(pull**2)):.2f}"
+        for name, pull in zip(names, pulls.T, strict=True)
+    )
 
 
 def write_page(rows: list[Row], folder: Path) -> None:
@@ -136,6 +157,7 @@ def main() -> int:
             flags = ",".join(row.found.flags)
             print(f"{row.case.photo.source} {row.case.words}: {what} [{flags}]")
     print(table(rows))
+    print(coverage(rows))
     if options.page is not None:
         write_page(rows, options.page)
     return 1 if any(row.silent for row in rows) else 0

@@ -89,6 +89,9 @@ class Measurement:
     length_mm, tip_mm, tip_angle_deg, width_mm
         Arc length, tip in the specimen frame, tangent angle at the tip and median
         width, in mm and degrees; NaN without a calibration.
+    length_sd_mm, tip_sd_mm, width_sd_mm, clamp_sd_mm
+        Standard deviations of length, of the tip along x and y, of the median width,
+        and of where along the rod it leaves the clamp; NaN without a calibration.
     length_px, width_px : float
         Arc length and median width in the photograph, in pixels.
     clamp_angle_sd_deg : float
@@ -115,6 +118,10 @@ class Measurement:
     tip_angle_deg: float = math.nan
     width_mm: float = math.nan
     clamp_angle_sd_deg: float = math.nan
+    length_sd_mm: float = math.nan
+    tip_sd_mm: tuple[float, float] = NAN2
+    width_sd_mm: float = math.nan
+    clamp_sd_mm: float = math.nan
     length_px: float = math.nan
     width_px: float = math.nan
     clamp_px: tuple[float, float] = NAN2

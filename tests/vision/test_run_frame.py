@@ -145,12 +145,18 @@ def test_own_clamps_come_back_from_a_shared_table(run, own, tmp_path):
 
 
 def assert_same(one, other):
-    """Compare tables cell by cell; numbers of ten digits, turned and turned back."""
-    lines = (path.read_text().splitlines() for path in (one, other))
-    for a, b in zip(*lines, strict=True):
-        for x, y in zip(a.split(","), b.split(","), strict=True):
+    """Compare tables cell by cell; numbers of ten digits, turned and turned back.
+
+    Of the tip's deviations the direction's share is taken out and put in again, of
+    squares: there half of the digits are left.
+    """
+    first, second = (path.read_text().splitlines() for path in (one, other))
+    names = first[0].split(",")
+    for a, b in zip(first, second, strict=True):
+        for name, x, y in zip(names, a.split(","), b.split(","), strict=True):
             if x != y:
-                assert float(x) == pytest.approx(float(y), rel=2e-9, abs=2e-8)
+                rel = 1e-3 if name.startswith("tip_") and "_sd_" in name else 2e-9
+                assert float(x) == pytest.approx(float(y), rel=rel, abs=2e-8)
 
 
 def test_loose_photographs_share_a_clamp_only_when_told(run, tmp_path):

@@ -81,6 +81,7 @@ def _in_frame(done: Done, to: Direction, run: str) -> Done:
         tip_angle_deg=row.tip_angle_deg - turn_deg,
         pose=replace(row.pose, angle_deg=to.angle_deg),
         clamp_angle_sd_deg=to.sd_deg,
+        tip_sd_mm=_tip_sd_mm(row, to.sd_deg),
         shared_clamp=run,
     )
     points, edges = dict(done.points), done.edges.copy()
@@ -89,6 +90,16 @@ def _in_frame(done: Done, to: Direction, run: str) -> Done:
         points["theta_rad"] = points["theta_rad"] - turn
     edges[:, 4], edges[:, 5] = _turned(edges[:, 4], edges[:, 5], turn)
     return replace(done, row=turned_row, points=points, edges=edges)
+
+
+def _tip_sd_mm(row: FrameRow, sd_deg: float) -> tuple[float, float]:
+    """Return the tip's deviations with another one of the direction at the clamp."""
+    change = math.radians(sd_deg) ** 2 - math.radians(row.clamp_angle_sd_deg) ** 2
+    (x, y), (sd_x, sd_y) = row.tip_mm, row.tip_sd_mm
+    return (
+        math.sqrt(max(sd_x**2 + change * y**2, 0.0)),
+        math.sqrt(max(sd_y**2 + change * x**2, 0.0)),
+    )
 
 
 def _turned(

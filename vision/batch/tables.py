@@ -30,6 +30,7 @@ FRAME_HEADER = (
     "width_mm", "clamp_x_px", "clamp_y_px", "tip_x_px", "tip_y_px", "clamp_x_mm",
     "clamp_y_mm", "clamp_angle_deg", "rod_height_mm", "reason",
     "clamp_angle_sd_deg", "own_angle_deg", "own_angle_sd_deg", "shared_clamp",
+    "length_sd_mm", "tip_x_sd_mm", "tip_y_sd_mm", "width_sd_mm", "clamp_sd_mm",
 )  # fmt: skip
 _FRAME_TEXTS = ("image", "status", "flags", "reason", "shared_clamp")
 _FRAME_NUMBERS = tuple(name for name in FRAME_HEADER if name not in _FRAME_TEXTS)
@@ -43,7 +44,8 @@ class FrameRow:
 
     The direction of `pose`, known to `clamp_angle_sd_deg`, is that of `shared_clamp`,
     the run or video whose photographs give it together; where that is empty it is the
-    photograph's own, ``own_angle_deg``, which stays in the table.
+    photograph's own, ``own_angle_deg``, which stays in the table. ``..._sd_...`` are
+    standard deviations, as in `Measurement`.
     """
 
     image: str
@@ -61,6 +63,10 @@ class FrameRow:
     own_angle_deg: float = math.nan
     own_angle_sd_deg: float = math.nan
     shared_clamp: str = ""
+    length_sd_mm: float = math.nan
+    tip_sd_mm: tuple[float, float] = NAN2
+    width_sd_mm: float = math.nan
+    clamp_sd_mm: float = math.nan
 
     @property
     def ok(self) -> bool:
@@ -103,6 +109,8 @@ def done_with(
         reason=" ".join(found.reason.split()),
         clamp_angle_sd_deg=found.clamp_angle_sd_deg,
         own_angle_deg=angle, own_angle_sd_deg=found.clamp_angle_sd_deg,
+        length_sd_mm=found.length_sd_mm, tip_sd_mm=found.tip_sd_mm,
+        width_sd_mm=found.width_sd_mm, clamp_sd_mm=found.clamp_sd_mm,
     )  # fmt: skip
     if not found.ok:
         return Done(row=row, sha256=sha256)
@@ -252,9 +260,10 @@ def _frame_cells(row: FrameRow) -> list[str]:
         *row.tip_px, *placed,
     )  # fmt: skip
     angles = row.clamp_angle_sd_deg, row.own_angle_deg, row.own_angle_sd_deg
+    deviations = row.length_sd_mm, *row.tip_sd_mm, row.width_sd_mm, row.clamp_sd_mm
     return [
         row.image, row.status, ";".join(row.flags), *map(_cell, sizes), row.reason,
-        *map(_cell, angles), row.shared_clamp,
+        *map(_cell, angles), row.shared_clamp, *map(_cell, deviations),
     ]  # fmt: skip
 
 
@@ -286,6 +295,10 @@ def _frame(text: Mapping[str, str], number: Mapping[str, float]) -> FrameRow:
         own_angle_deg=value("own_angle_deg"),
         own_angle_sd_deg=value("own_angle_sd_deg"),
         shared_clamp=text["shared_clamp"],
+        length_sd_mm=value("length_sd_mm"),
+        tip_sd_mm=(value("tip_x_sd_mm"), value("tip_y_sd_mm")),
+        width_sd_mm=value("width_sd_mm"),
+        clamp_sd_mm=value("clamp_sd_mm"),
     )
 
 

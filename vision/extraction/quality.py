@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 
-from ..camera.calibration import Calibration
 from ..curve.robust import median, quantile
 from ..edge.state import LostError
 from ..edge.step_line import lanes
@@ -14,9 +14,10 @@ from ..find.ground import View
 from ..find.rod import Candidate
 from ..measurement import Measurement
 from ..picture.photo import Photo
+from .deviations import scale_sd
 from .refine import Refined
+from .root import root_hidden
 from .setting import Setting
-from .specimen_frame import root_hidden
 
 LENGTH_TOLERANCE = 0.02
 
@@ -70,11 +71,13 @@ def doubts(
     setting: Setting,
 ) -> Measurement:
     """Return the measurement with its flags."""
-    flags: list[str] = []
+    flags = list(result.flags)
     if setting.calibration is None:
         flags.append("uncalibrated")
-    elif _scale_sd(setting.calibration, setting.axis_height_mm) > SCALE:
+    elif scale_sd(setting.calibration, setting.axis_height_mm) > SCALE:
         flags.append("height_doubtful")
+    if _height_is_assumed(setting):
+        flags.append("height_assumed")
     if candidate.root == "border":
         flags.append("clamp_at_border")
     if candidate.root == "free":
@@ -120,12 +123,12 @@ def _tip_goes_on(view: View, refined: Refined) -> bool:
     return bool(quantile(step, 0.25) > PALER_TIP * contrast)
 
 
-def _scale_sd(camera: Calibration, rod_height_mm: float) -> float:
-    """Return how well the scale is known at the rod's height, relative."""
-    if rod_height_mm == 0.0:
-        return 0.0
-    height = camera.camera_height_mm
-    return abs(rod_height_mm) * camera.camera_height_sd_mm / height**2
+def _height_is_assumed(setting: Setting) -> bool:
+    """Whether nobody said how high the rod lies above the board, where it matters."""
+    camera = setting.calibration
+    if camera is None or setting.rod_height_mm is not None:
+        return False
+    return camera.rod_height_mm == 0.0 and math.isfinite(camera.camera_height_sd_mm)
 
 
 def direction_is_doubtful(sd_deg: float, length_mm: float) -> bool:

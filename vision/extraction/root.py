@@ -1,0 +1,159 @@
+"""Where the axis leaves the clamp: from the lines that are seen there, with its doubt.
+
+The clamp's front plane is seen at the top of the rod (its face) and at the paper (its
+front line), if the camera looks at it; else only the clamp's top edge is. Each line is
+carried to the height of the axis. Where the two then disagree, one of them is of
+something else (a shade's border, a chamfer), and the place is known no better.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..camera.projection import LocalView
+from ..edge.clamp import between
+from ..edge.ends import APART_PX, is_face
+from ..edge.step_line import EndFace
+from .refine import Refined
+from .setting import UNKNOWN_CLAMP_MM, Setting
+
+HIDDEN_MM = 0.05
+"""What part of the root a clamp of unknown height may hide before that is named."""
+
+LINE_PX, ONE_LINE_PX, BORDER_PX = 0.08, 0.2, 0.3
+"""Standard deviation of a place that two lines tell alike, that one tells and nothing
+checks, and of where a rod enters the picture."""
+
+
+_STEP_PX = 20.0
+"""Length over which lines are taken for straight."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RootPlace:
+    """Where a rod begins.
+
+    Parameters
+    ----------
+    s : float
+        Arc length on the fitted curve, px.
+    sd : float
+        Its standard deviation, px.
+    hidden : float
+        Part of it for what a clamp of unknown height may hide, px.
+    apart : float
+        How far the two lines at the clamp are apart, px; 0 where one is seen.
+    """
+
+    s: float
+    sd: float
+    hidden: float = 0.0
+    apart: float = 0.0
+
+    @property
+    def lines_differ(self) -> bool:
+        """Whether the two lines at the clamp tell different places."""
+        return abs(self.apart) > APART_PX
+
+
+def root_place(
+    refined: Refined, ends: LocalView, setting: Setting, side_mm: float
+) -> RootPlace:
+    """Return where the axis leaves the clamp, on the fitted curve.
+
+    Parameters
+    ----------
+    refined : Refined
+        The rod in pixels.
+    ends : LocalView
+        How the camera sees its ends, the root first.
+    setting : Setting
+        What is known.
+    side_mm : float
+        Side of its section.
+    """
+    if refined.clamp is None:
+        return RootPlace(s=0.0, sd=BORDER_PX)
+    rise = float(ends.rise_along[0])
+    if rise > 0.0:
+        hidden = hidden_px(refined, setting, rise) / math.sqrt(3.0)
+        place = _hidden_root(refined, ends, setting)
+        return RootPlace(s=place, sd=math.hypot(ONE_LINE_PX, hidden), hidden=hidden)
+    face, front = refined.clamp.face, refined.clamp.front
+    seen_at, axis_mm = [], setting.axis_height_mm
+    if face is not None:
+        seen_at.append(_below(refined, face, axis_mm + 0.5 * side_mm, setting))
+    if front is not None:
+        seen_at.append(_below(refined, front, 0.0, setting))
+    if not seen_at:
+        return RootPlace(s=0.0, sd=ONE_LINE_PX)
+    if len(seen_at) == 1:
+        return RootPlace(s=seen_at[0], sd=ONE_LINE_PX)
+    apart = seen_at[1] - seen_at[0]
+    if abs(apart) <= APART_PX:
+        place = between(seen_at[0], seen_at[1], refined.clamp)
+        return RootPlace(s=place, sd=math.hypot(LINE_PX, 0.5 * apart), apart=apart)
+    if is_face(apart, setting.face_px(refined.fit.curve)):
+        return RootPlace(s=seen_at[1], sd=ONE_LINE_PX)
+    return RootPlace(s=seen_at[0], sd=0.5 * abs(apart), apart=apart)
+
+
+def root_hidden(refined: Refined, setting: Setting) -> bool:
+    """Whether the clamp's top may hide more of the root than `HIDDEN_MM`.
+
+    Not where the height of the clamp or the length of the rod is known: then the root
+    is put where it belongs.
+    """
+    if setting.calibration is None:
+        return False
+    ends = refined.fit.curve.points[:1], refined.fit.curve.theta[:1]
+    at = setting.view(setting.calibration, *ends)
+    hidden = hidden_px(refined, setting, float(at.rise_along[0]))
+    return hidden > HIDDEN_MM * float(at.along[0])
+
+
+def hidden_px(refined: Refined, setting: Setting, rise: float) -> float:
+    """Return how much of the root a clamp of unknown height may hide."""
+    known = setting.clamp_height_mm is not None or setting.length_mm is not None
+    return 0.0 if known or refined.clamp is None else max(0.0, rise) * UNKNOWN_CLAMP_MM
+
+
+def _below(
+    refined: Refined, line: EndFace, height_mm: float, setting: Setting
+) -> float:
+    """Return where the axis passes under (or over) a line seen at another height.
+
+    Both are carried to the board frame: near a telephone the line is moved along
+    itself too, and is not seen at a right angle to the rod.
+    """
+    camera = setting.calibration
+    if camera is None:
+        return line.s
+    curve, axis_mm = refined.fit.curve, setting.axis_height_mm
+    points, theta = curve.at(np.array([line.s, line.s + _STEP_PX]))
+    along = np.array([math.cos(theta[0]), math.sin(theta[0])])
+    right = np.array([-along[1], along[0]])
+    beside = points[0] + _STEP_PX * (right + line.skew * along)
+    first, second = camera.to_mm(np.array([points[0], beside]), height_mm=height_mm)
+    start, ahead = camera.to_mm(points, height_mm=axis_mm)
+    sides = np.column_stack([ahead - start, first - second])
+    if abs(np.linalg.det(sides)) < 1e-9:
+        return line.s
+    return line.s + _STEP_PX * float(np.linalg.solve(sides, first - start)[0])
+
+
+def _hidden_root(refined: Refined, ends: LocalView, setting: Setting) -> float:
+    """Return the root where the clamp's top edge hides it: by height, or by length."""
+    rise, along = float(ends.rise_along[0]), float(ends.along[0])
+    if setting.clamp_height_mm is not None:
+        lines = refined.clamp and (refined.clamp.front or refined.clamp.face)
+        if lines is None:
+            return 0.0
+        return _below(refined, replace(lines, s=0.0), setting.clamp_height_mm, setting)
+    if setting.length_mm is None:
+        return 0.0
+    missing = setting.length_mm * along - refined.tip.s
+    return -float(np.clip(missing, 0.0, 10.0 * rise))
