@@ -1,65 +1,135 @@
-"""Do the fit's intervals hold on photographs? Twin runs with hidden truth, measured.
+"""Do the fit's intervals hold, and does it know when it is wrong?
 
-Run by hand: python benchmarks/bench_fit.py [runs] [folder to keep the runs in]
+    python benchmarks/bench_fit.py --right 100 --wrong 5 --photographs 0 --first 5000
+
+`--right` runs are off in everything, drawn from the fit's own priors; `--wrong` runs of
+each wrong model (tests/analysis/wrong_models.py) are off in one thing at the size given
+there; both have lines as photographs give them, without painting. `--photographs` runs
+are painted, calibrated and measured, off in everything. Seeds count from `--first`:
+take others than those a change was made with.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 import tempfile
+import time
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from magbend import sim
-from magbend.analysis import fit_runs, load_run
-from magbend.analysis.twin.bench import hide
+from magbend.analysis import FitResult, fit_runs, load_run
+from magbend.analysis.runs.load import RunData
+from magbend.analysis.twin.bench import HiddenTruth
+from magbend.analysis.twin.lines import lines_run
 from magbend.analysis.twin.run import bench_run
 
-FIRST_SEED = 1000
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "analysis"))
+from wrong_models import GAPS_MM, WRONG, all_off, wrong_run
 
 
-def scores(folder: Path, runs: int) -> dict[str, float]:
-    """Return how the claimed deviations compare with the truth, over twin runs."""
-    z, claimed, error = [], [], []
-    for k in range(runs):
-        path, seed = folder / f"run_{k:03d}", FIRST_SEED + k
+def right_runs(seeds: Sequence[int]) -> Iterator[tuple[RunData, HiddenTruth]]:
+    """Give runs that are off in everything, and their truth."""
+    for seed in seeds:
+        bench, errors, rng = all_off(seed)
+        yield lines_run(bench, GAPS_MM, rng, errors), bench.truth
+
+
+def photographed(
+    seeds: Sequence[int], folder: Path
+) -> Iterator[tuple[RunData, HiddenTruth]]:
+    """Give the same benches as `right_runs`, photographed."""
+    for seed in seeds:
+        bench, _, _ = all_off(seed)
+        path = folder / f"run_{seed}"
         if not (path / "frames.csv").exists():
-            bench_run(path, specimen=sim.gmc(1 + k % 7), seed=seed)
-        run = load_run(path)
-        assert run.magnet is not None
-        truth = hide(run.specimen, run.magnet, seed=seed).specimen
+            bench_run(path, specimen=bench.specimen, seed=seed, truth=bench.truth)
+        yield load_run(path), bench.truth
+
+
+def z_of(fit: FitResult, moduli: Sequence[float]) -> list[float]:
+    """Return errors over their standard deviations, of the identifiable moduli."""
+    return [
+        (value - true) / sd
+        for value, true, sd in zip(fit.E_MPa, moduli, fit.E_sd_MPa, strict=True)
+        if np.isfinite(value)
+    ]
+
+
+def score(pairs: Iterator[tuple[RunData, HiddenTruth]], what: str) -> None:
+    """Print coverage and false alarms of right models."""
+    z: list[float] = []
+    p, words, rms, sds = [], [], [], []
+    start = time.process_time()
+    for run, truth in pairs:
         fit = fit_runs([run])
-        for i, section in enumerate(truth.sections):
-            if f"E_MPa[{i}]" not in fit.not_identifiable:
-                z.append((fit.E_MPa[i] - section.E_MPa) / fit.E_sd_MPa[i])
-                claimed.append(fit.E_sd_MPa[i] / fit.E_MPa[i])
-                error.append(fit.E_MPa[i] / section.E_MPa - 1.0)
-    size = np.abs(z)
-    return {
-        "moduli": len(z),
-        "within_95": float(np.mean(size < 1.96)),
-        "within_68": float(np.mean(size < 1.0)),
-        "median_sd": float(np.median(claimed)),
-        "rms_error": float(np.sqrt(np.mean(np.square(error)))),
-        "claimed_over_scatter": float(1.0 / np.sqrt(np.mean(np.square(z)))),
-    }
+        assert fit.verdict is not None
+        moduli = [section.E_MPa for section in truth.specimen.sections]
+        z += z_of(fit, moduli)
+        rms += [a / b - 1.0 for a, b in zip(fit.E_MPa, moduli, strict=True)]
+        sds += [sd / a for a, sd in zip(fit.E_MPa, fit.E_sd_MPa, strict=True)]
+        p.append(fit.verdict.p_value)
+        words.append(fit.verdict.verdict)
+    size, count = np.abs(z), len(words)
+    alarms = [word for word in words if word != "supported"]
+    print(f"{count} {what}, {len(z)} moduli")
+    print(f"  in their 95 % interval: {np.mean(size < 1.96):.1%}")
+    print(f"  in their 68 % interval: {np.mean(size < 0.994):.1%}")
+    print(f"  z, RMS: {np.sqrt(np.mean(size**2)):.2f}")
+    print(f"  error, RMS: {np.sqrt(np.nanmean(np.square(rms))):.1%}")
+    print(
+        f"  claimed standard deviation, RMS: {np.sqrt(np.nanmean(np.square(sds))):.1%}"
+    )
+    print(
+        f"  false alarms: {len(alarms)} ({alarms.count('contradicted')} contradicted)"
+    )
+    print(f"  p, quartiles: {np.round(np.quantile(p, [0.25, 0.5, 0.75]), 2)}")
+    print(f"  CPU a run: {(time.process_time() - start) / count:.2f} s")
 
 
-def main(runs: int, folder: Path) -> None:
-    found = scores(folder, runs)
-    print(f"{runs} runs of the twin bench, {found['moduli']:.0f} moduli")
-    print(f"in the 95 % interval: {found['within_95']:.1%}")
-    print(f"in the 68 % interval: {found['within_68']:.1%}")
-    print(f"claimed standard deviation, median: {found['median_sd']:.2%}")
-    print(f"actual error, RMS: {found['rms_error']:.2%}")
-    print(f"claimed over actual scatter: {found['claimed_over_scatter']:.2f}")
+def wrong_models(seeds: Sequence[int]) -> None:
+    """Print how each wrong model comes out."""
+    print(f"{len(seeds)} runs of each wrong model")
+    print("  held: covered or not supported; named: right suspect among the first two")
+    for name, wrong in WRONG.items():
+        held, named, supported, z = [], [], [], []
+        for seed in seeds:
+            run, moduli = wrong_run(wrong, seed)
+            fit = fit_runs([run])
+            assert fit.verdict is not None
+            z.append(np.max(np.abs(z_of(fit, moduli))))
+            supported.append(fit.verdict.verdict == "supported")
+            held.append(z[-1] < 1.96 or not supported[-1])
+            first = fit.verdict.suspects[:2]
+            named.append(any(s.name.startswith(wrong.right) for s in first))
+        print(
+            f"  {name:28} held {np.mean(held):4.0%}  named {np.mean(named):4.0%}  "
+            f"supported {np.mean(supported):4.0%}  worst z {np.max(z):.1f}",
+            flush=True,
+        )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--right", type=int, default=100)
+    parser.add_argument("--wrong", type=int, default=5)
+    parser.add_argument("--photographs", type=int, default=0)
+    parser.add_argument("--first", type=int, default=5000)
+    parser.add_argument("--keep", type=Path, help="folder to keep photographed runs in")
+    given = parser.parse_args()
+    first = given.first
+    if given.right:
+        score(right_runs(range(first, first + given.right)), "runs off in everything")
+    if given.wrong:
+        wrong_models(range(first, first + given.wrong))
+    if given.photographs:
+        seeds = range(first, first + given.photographs)
+        with tempfile.TemporaryDirectory() as scratch:
+            runs = photographed(seeds, given.keep or Path(scratch))
+            score(runs, "photographed runs off in everything")
 
 
 if __name__ == "__main__":
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else 70
-    if len(sys.argv) > 2:
-        main(count, Path(sys.argv[2]))
-    else:
-        with tempfile.TemporaryDirectory() as scratch:
-            main(count, Path(scratch))
+    main()

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from .checks import finite, size, store, vector
+from .checks import finite, size, store, vector, within
 
 Vector = tuple[float, float, float]
 
@@ -53,6 +53,8 @@ class Magnet:
     offset_mm : tuple of float
         Shift (x, y, z) of the magnet in the specimen frame, in mm, away from the pose
         in which its axis passes through the undeformed tip.
+    remanence_sd_T : float, optional
+        Standard deviation of the remanence, where it is known.
 
     Raises
     ------
@@ -65,6 +67,7 @@ class Magnet:
     axis_angle_deg: float = 90.0
     elevation_deg: float = 0.0
     offset_mm: Vector = (0.0, 0.0, 0.0)
+    remanence_sd_T: float | None = None
 
     def __post_init__(self) -> None:
         sides = vector(self.sides_mm, "magnet sides_mm", "mm")
@@ -78,6 +81,9 @@ class Magnet:
             elevation_deg=finite(self.elevation_deg, "magnet elevation_deg", "deg"),
             offset_mm=vector(self.offset_mm, "magnet offset_mm", "mm", 1e9),
         )
+        if self.remanence_sd_T is not None:
+            sd = within(self.remanence_sd_T, 0.0, 30.0, "magnet remanence_sd_T", "T")
+            store(self, remanence_sd_T=sd)
 
     @classmethod
     def cube(cls, side_mm: float, remanence_T: float, **pose: float) -> Magnet:

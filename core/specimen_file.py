@@ -80,6 +80,7 @@ class MagnetModel(FileModel):
     axis_angle_deg: float = 90.0
     elevation_deg: float = 0.0
     offset_mm: Vector = (0.0, 0.0, 0.0)
+    remanence_sd_T: NonNegativeFloat | None = None
 
     def model_post_init(self, _context: object) -> None:
         """Check that exactly one of side_mm and sides_mm is given."""
@@ -95,6 +96,7 @@ class MagnetModel(FileModel):
             axis_angle_deg=self.axis_angle_deg,
             elevation_deg=self.elevation_deg,
             offset_mm=self.offset_mm,
+            remanence_sd_T=self.remanence_sd_T,
         )
 
 

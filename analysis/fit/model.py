@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ... import sim
-from ...core.specimen import Specimen
+from ...core.cross_section import ALL_SIZES
+from ...core.specimen import Section, Specimen
 from ..compare.metrics import position_at
 from .nuisance import Owner
 from .problem import Datum, Problem, Shot
@@ -19,6 +21,10 @@ Values = dict[str, float]
 
 VIEW = ("frame_angle_deg", "scale_percent", "clamp_position_mm")
 """What changes how a shape is seen, and not the shape."""
+
+CURVATURE = "natural_curvature_per_mm"
+CURVATURE_STEP = 1e-4
+"""1/mm, of the difference that gives the effect of a natural curvature."""
 
 PARTS = 4
 """Pieces of a section whose stiffness changes gradually."""
@@ -33,22 +39,74 @@ def values_of(problem: Problem, owner: Owner, unknowns: Array) -> Values:
 
 def shape_of(problem: Problem, shot: Shot, values: Values) -> Array | None:
     """Return the predicted points, shape (n, 2) in mm; None without an equilibrium."""
-    specimen = rod_of(shot.specimen, values)
-    support = _support_of(problem, values)
-    theory = "solid" if problem.model == "solid" else "rod"
+    nominal, per_curvature = shot.bow
+    specimen = straight(rod_of(shot.specimen, values))
+    xy_mm = solved_mm(problem, shot, specimen, values)
+    if xy_mm is None:
+        return None
+    return xy_mm + nominal + values.get(CURVATURE, 0.0) * per_curvature
+
+
+def solved_mm(
+    problem: Problem, shot: Shot, specimen: Specimen, values: Values
+) -> Array | None:
+    """Return the points of a rod in the field of a shot, as `shape_of` does."""
     field = _field_of(shot.field, values)
     if problem.model == "uniform" and isinstance(field, sim.MagnetField):
         field = sim.UniformField(
             flux_mT=tip_flux_mT(field, shot.specimen.length_mm),
             angle_deg=field.magnet.axis_angle_deg,
         )
+    # Only a straight rod can be solved as a solid.
+    solid = problem.model == "solid" and specimen.is_plain
     shape = sim.solve(
-        specimen, field, support=support, model=theory, points=241
-    ).centreline
+        specimen, field, support=_support_of(problem, values),
+        model="solid" if solid else "rod", points=241,
+    ).centreline  # fmt: skip
     if shape is None:
         return None
     # A measured line may be a little longer than the rod, never asked beyond its tip.
     return np.column_stack(position_at(shape, shot.line.s_mm))
+
+
+def with_bow(problem: Problem, unknowns: Array) -> Problem:
+    """Return the problem with what natural curvature does to its shapes.
+
+    A curved rod needs the solver in space, 15 times slower; its curvature is small.
+    So its effect is taken once, around `unknowns`, and added to the straight rod's.
+    """
+    return replace(
+        problem, shots=tuple(_bowed(problem, shot, unknowns) for shot in problem.shots)
+    )
+
+
+def _bowed(problem: Problem, shot: Shot, unknowns: Array) -> Shot:
+    values = values_of(problem, shot.owner, unknowns)
+    rod = rod_of(shot.specimen, values)
+    at = [straight(rod)]
+    at += [
+        replace(rod, natural_curvature_per_mm=rod.natural_curvature_per_mm + step)
+        for step in (0.0, CURVATURE_STEP, -CURVATURE_STEP)
+    ]
+    if any(section.natural_curvature_per_mm is not None for section in rod.sections):
+        at[2:] = []  # each section has its own: it is taken as it is
+    seen = [solved_mm(problem, shot, specimen, values) for specimen in at]
+    if any(xy is None for xy in seen):
+        return shot
+    column = np.zeros_like(shot.bow[1])
+    if len(seen) > 2:
+        column = (seen[2] - seen[3]) / (2.0 * CURVATURE_STEP)
+    return replace(shot, bow=np.stack([seen[1] - seen[0], column]))
+
+
+def straight(rod: Specimen) -> Specimen:
+    """Return the rod without its natural curvature."""
+    if not any(rod.natural_curvatures_per_mm):
+        return rod
+    sections = tuple(
+        replace(section, natural_curvature_per_mm=None) for section in rod.sections
+    )
+    return replace(rod, natural_curvature_per_mm=0.0, sections=sections)
 
 
 def across_mm(shot: Shot, values: Values, xy_mm: Array) -> Array:
@@ -100,7 +158,7 @@ def rod_of(nominal: Specimen, values: Values) -> Specimen:
         ends[i] += values.get(f"joint_mm[{i}]", 0.0)
         ends[i:] += values.get(f"section_length_mm[{i}]", 0.0)
     ends[-1] += values.get("length_mm", 0.0)
-    side = 1.0 + values.get("side_percent", 0.0) / 100.0
+    size = 1.0 + values.get("side_percent", 0.0) / 100.0
     remanence = 1.0 + values.get("remanence_percent", 0.0) / 100.0
     if "remanence_mT" in values:
         remanence *= values["remanence_mT"] / nominal.remanence_mT
@@ -112,20 +170,32 @@ def rod_of(nominal: Specimen, values: Values) -> Specimen:
             nominal.sections[i],
             length_mm=float(length),
             E_MPa=values[f"E_MPa[{i}]"],
-            side_mm=nominal.sides_mm[i] * side,
+            **_scaled(nominal.sections[i], ALL_SIZES, size),
             remanence_mT=nominal.remanences_mT[i] * remanence * (1 + slope * along[i]),
+            **_scaled(
+                nominal.sections[i], ("remanence_y_mT", "remanence_z_mT"), remanence
+            ),
         )
         for i, length in enumerate(np.diff(ends, prepend=0.0))
     )
     known = nominal.density_kg_m3
     changed = replace(
         nominal,
-        side_mm=nominal.side_mm * side,
+        **_scaled(nominal, ALL_SIZES, size),
+        **_scaled(nominal, ("remanence_y_mT", "remanence_z_mT"), remanence),
         sections=sections,
         density_kg_m3=None if known is None else known * density,
     )
     share = values.get("stiffness_gradient", 0.0)
     return _graded(changed, share) if share else changed
+
+
+def _scaled(
+    part: Specimen | Section, names: Sequence[str], factor: float
+) -> dict[str, float]:
+    """Return the numbers that a part has of its own, times a factor."""
+    own = {name: getattr(part, name) for name in names}
+    return {name: factor * value for name, value in own.items() if value is not None}
 
 
 def _graded(rod: Specimen, share: float) -> Specimen:

@@ -23,7 +23,7 @@ MODES = 12
 SHAPE = 6
 """Modes that a wrong model may reach; those above are errors of the measurement."""
 
-FLOOR_MM = 2e-4
+FLOOR_MM = 3e-5
 """What the spline through a line and the solver are good to, in each mode."""
 
 STATED_FACTOR = 5.0

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 from ...core.errors import InputError
+from ...core.magnet import Magnet
 from ...core.specimen import Specimen
 
 FRAME_ANGLE_SD_DEG = 0.3
@@ -18,6 +19,15 @@ SIDE_PERCENT = 1.0
 REMANENCE_PERCENT = 6.6
 """Taken where the specimen states none: scatter of the paper's three rods of one recipe
 (GMC 2, 6 and 7 read 20.07, 19.19 and 21.82 mT)."""
+
+DENSITY_PERCENT = 5.0
+"""Taken where the specimen states none: a density computed from the recipe."""
+
+LENGTH_MM = 0.1
+"""Taken where the specimen states none: a rod cut by hand."""
+
+CURVATURE_PER_MM = 1e-4
+"""Taken where the specimen states none: 0.045 mm at the tip of 30 mm."""
 
 MAGNET_PERCENT = 10.0
 """Taken where the rig file states none: its figure may be a catalogue's."""
@@ -45,7 +55,8 @@ class Nuisance:
         Direction of the measured frame, of a photograph, or of all that share a clamp.
         None takes what each states itself (``clamp_angle_sd_deg`` of ``frames.csv``).
     magnet_percent : float or None
-        Remanence of the magnet about that of the rig file; None takes `MAGNET_PERCENT`.
+        Remanence of the magnet about that of the rig file. None takes what that states,
+        else `MAGNET_PERCENT`.
     meter_percent, meter_offset_mT : float
         Gain and zero of the Tesla-meter.
     side_percent : float or None
@@ -53,14 +64,18 @@ class Nuisance:
         specimen states, else `SIDE_PERCENT`.
     length_mm : float or None
         Length of the rod, at its tip; the measured length is set against it. None takes
-        what the specimen states, else 0.1 mm.
+        what the specimen states, else `LENGTH_MM`.
     joint_mm : float
         Place of each joint.
     remanence_percent : float or None
         Remanence of the rod. None takes what the specimen states, else
         `REMANENCE_PERCENT`.
-    density_percent : float
-        Density of the rod, where weight acts.
+    density_percent : float or None
+        Density of the rod, where weight acts. None takes what the specimen states, else
+        `DENSITY_PERCENT`.
+    natural_curvature_per_mm : float or None
+        Curvature of the rod without load. None takes what the specimen states, else
+        `CURVATURE_PER_MM`.
 
     Raises
     ------
@@ -81,7 +96,8 @@ class Nuisance:
     length_mm: float | None = None
     joint_mm: float = 0.2
     remanence_percent: float | None = None
-    density_percent: float = 2.0
+    density_percent: float | None = None
+    natural_curvature_per_mm: float | None = None
 
     def __post_init__(self) -> None:
         for name in NUISANCE_NAMES:
@@ -100,17 +116,28 @@ class Nuisance:
             return self.frame_angle_deg
         return stated_deg if math.isfinite(stated_deg) else FRAME_ANGLE_SD_DEG
 
+    def magnet_sd_percent(self, magnet: Magnet) -> float:
+        """Return the prior of a magnet, with what the rig file states."""
+        if self.magnet_percent is not None:
+            return self.magnet_percent
+        return _percent(magnet.remanence_sd_T, magnet.remanence_T, MAGNET_PERCENT)
+
     def of_rod(self, specimen: Specimen) -> dict[str, float]:
         """Return the priors of one rod, with what its file states."""
-        side = _percent(specimen, "side_sd_mm", specimen.side_mm, SIDE_PERCENT)
+        side = _percent(specimen.side_sd_mm, specimen.side_mm, SIDE_PERCENT)
         remanence = _percent(
-            specimen, "remanence_sd_mT", specimen.remanence_mT, REMANENCE_PERCENT
+            specimen.remanence_sd_mT, specimen.remanence_mT, REMANENCE_PERCENT
         )
-        length = getattr(specimen, "length_sd_mm", None)
+        density = _percent(
+            specimen.density_sd_kg_m3, specimen.density_kg_m3, DENSITY_PERCENT
+        )
+        length, bow = specimen.length_sd_mm, specimen.natural_curvature_sd_per_mm
         told = {
             "side_percent": side,
             "remanence_percent": remanence,
-            "length_mm": 0.1 if length is None else length,
+            "density_percent": density,
+            "length_mm": LENGTH_MM if length is None else length,
+            "natural_curvature_per_mm": CURVATURE_PER_MM if bow is None else bow,
         }
         priors = {
             name: stated if (own := getattr(self, name)) is None else own
@@ -121,15 +148,14 @@ class Nuisance:
         return priors
 
 
-def _percent(specimen: Specimen, key: str, size: float, default: float) -> float:
-    stated = getattr(specimen, key, None)
+def _percent(stated: float | None, size: float | None, default: float) -> float:
     return default if stated is None or not size else 100.0 * stated / abs(size)
 
 
 NUISANCE_NAMES = tuple(field.name for field in fields(Nuisance))
 _TOLD_BY_FILES = (
     "frame_angle_deg", "magnet_percent", "side_percent", "length_mm",
-    "remanence_percent",
+    "remanence_percent", "density_percent", "natural_curvature_per_mm",
 )  # fmt: skip
 
 

@@ -21,7 +21,7 @@ from ...core.specimen import Specimen
 from ..compare.compare import field_of, frame_problem, usable_flux
 from ..runs.load import RunData, Step
 from .noise import FLOOR_MM, mode_matrix, spectrum, stated_mm
-from .nuisance import MAGNET_PERCENT, Nuisance, Owner, scope_of
+from .nuisance import Nuisance, Owner, scope_of
 
 Array = NDArray[np.float64]
 
@@ -64,6 +64,9 @@ class Shot:
         From points across the line to modes (`noise.mode_matrix`).
     noise_mm : float
         Size of the errors of the first mode.
+    bow : ndarray, shape (2, n, 2)
+        What the rod's natural curvature adds to its shape: of the nominal one in mm,
+        and per (1/mm) of another (`bow.with_bow`).
     frame_sd_deg : float
         How sure the photograph is of its clamp direction; NaN if it does not say.
     flags : tuple of str
@@ -79,6 +82,7 @@ class Shot:
     sigma_mm: Array
     modes: Array
     noise_mm: float
+    bow: Array
     frame_sd_deg: float
     flags: tuple[str, ...]
 
@@ -352,6 +356,7 @@ def _shot(run: RunData, step: Step, model: str, owner: Owner) -> Shot | str:
         sigma_mm=stated,
         modes=mode_matrix(line.s_mm),
         noise_mm=stated_mm(stated),
+        bow=np.zeros((2, len(line.s_mm), 2)),
         frame_sd_deg=frame.clamp_angle_sd_deg,
         flags=frame.flags,
     )
@@ -397,17 +402,13 @@ def _priors(
         run, owner = runs[shot.owner.run], shot.owner
         sds = {
             name: getattr(nuisance, name)
-            for name in (
-                "clamp_angle_deg", "scale_percent", "clamp_position_mm",
-                "density_percent",
-            )
-        }  # fmt: skip
+            for name in ("clamp_angle_deg", "scale_percent", "clamp_position_mm")
+        }
         sds |= nuisance.of_rod(shot.specimen)
         if owner.frame == owner.photograph:
             sds["frame_angle_deg"] = nuisance.frame_sd_deg(shot.frame_sd_deg)
         if run.magnet is not None:
-            told = nuisance.magnet_percent
-            sds["magnet_percent"] = MAGNET_PERCENT if told is None else told
+            sds["magnet_percent"] = nuisance.magnet_sd_percent(run.magnet)
         for name in ("meter_percent", "meter_offset_mT", "gap_mm"):
             sds[name] = getattr(nuisance, name)
         if isinstance(shot.field, sim.MagnetField):

@@ -10,7 +10,7 @@ import numpy as np
 from ... import sim
 from ...core.errors import MagbendError, SolverError
 from ..runs.load import RunData
-from .model import shape_of, values_of
+from .model import shape_of, values_of, with_bow
 from .noise import noise_mm, stated_mm
 from .nuisance import Nuisance
 from .problem import Problem, build_problem, with_noise
@@ -72,7 +72,8 @@ def fit_runs(
 
 def fit_problem(problem: Problem, limits: Limits) -> FitResult:
     """Fit a problem twice: what the first search leaves shows the errors of lines."""
-    unknowns = search(problem, limits)
+    unknowns = search(with_bow(problem, np.zeros(problem.size)), limits)
+    problem = with_bow(problem, unknowns)
     stated = [stated_mm(shot.sigma_mm) for shot in problem.shots]
     problem = with_noise(problem, noise_mm(left_over(problem, unknowns), stated))
     unknowns = search(problem, limits, unknowns)

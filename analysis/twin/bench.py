@@ -47,11 +47,18 @@ class HiddenTruth:
         The true magnet: remanence and pose differ.
     clamp_angle_deg : float
         How far the clamp is turned from the nominal x axis, counter-clockwise.
+    gap_mm : float
+        How much farther than the stage says the magnet stands.
+    meter_gain, meter_offset_mT : float
+        What the Tesla-meter makes of a flux density.
     """
 
     specimen: Specimen
     magnet: Magnet
     clamp_angle_deg: float
+    gap_mm: float = 0.0
+    meter_gain: float = 1.0
+    meter_offset_mT: float = 0.0
 
 
 def hide(nominal: Specimen, magnet: Magnet, *, seed: int) -> HiddenTruth:
@@ -122,6 +129,7 @@ class TwinBench:
         gravity_m_s2: Vector = (0.0, 0.0, 0.0),
     ) -> None:
         self.specimen = specimen
+        self.magnet = magnet
         self.truth = truth or hide(specimen, magnet, seed=seed)
         self.board = Board()
         self.axis_height_mm = side_up_mm + specimen.side_mm / 2.0
@@ -145,7 +153,7 @@ class TwinBench:
         """Return the true equilibrium at a gap."""
         return solve(
             self.truth.specimen,
-            MagnetField(magnet=self.truth.magnet, gap_mm=gap_mm),
+            MagnetField(magnet=self.truth.magnet, gap_mm=gap_mm + self.truth.gap_mm),
             support=self._support,
             points=241,
         )
@@ -157,11 +165,13 @@ class TwinBench:
         """
         length_mm = self.specimen.length_mm
         tip = np.array([[length_mm, 0.0, 0.0]])
+        truth = self.truth
         flux = magnet_flux_mT(
-            self.truth.magnet, tip, length_mm=length_mm, gap_mm=gap_mm
+            truth.magnet, tip, length_mm=length_mm, gap_mm=gap_mm + truth.gap_mm
         )[0]
         # The approach points toward the magnet, the nominal flux away from it.
-        return float(-(flux[0] * self._approach[0] + flux[1] * self._approach[1]))
+        along_mT = -(flux[0] * self._approach[0] + flux[1] * self._approach[1])
+        return float(truth.meter_gain * along_mT + truth.meter_offset_mT)
 
     def photograph(self, gap_mm: float, time_s: float) -> NDArray[np.uint8]:
         """Return the picture, shape (h, w, 3), that the top camera takes at a gap.
@@ -205,7 +215,7 @@ class TwinBench:
         return Scene(
             clamp=Block(pose=pose),
             centreline=self.solution(gap_mm).centreline,
-            side_mm=self.specimen.side_mm,
+            side_mm=self.truth.specimen.side_mm,
             light=_LIGHT,
             paper_seed=self._seed,
         )

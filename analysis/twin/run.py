@@ -31,7 +31,7 @@ from ...vision import (
     read_photo,
     write_calibration,
 )
-from .bench import TwinBench
+from .bench import HiddenTruth, TwinBench
 
 _SWING = {"swing_mm": 1.0, "swing_Hz": 2.0, "damping_s": 0.4}
 """How the twin's rod swings after the stage arrived."""
@@ -44,6 +44,7 @@ def open_twin_bench(
     clock: Clock,
     log: WireLog | None = None,
     camera: Mapping[str, Any] | None = None,
+    truth: HiddenTruth | None = None,
 ) -> tuple[TwinBench, Devices]:
     """Open the twin bench of a plan: its specimen before its rig's magnet.
 
@@ -59,6 +60,8 @@ def open_twin_bench(
         Where every byte to and from the board is recorded.
     camera : mapping, optional
         Options of the twin's camera besides the rod's swing, such as ``frame_s``.
+    truth : HiddenTruth, optional
+        Given in place of the seeded one.
 
     Raises
     ------
@@ -71,7 +74,7 @@ def open_twin_bench(
             f"with side_mm and remanence_T"
         )
     bench = TwinBench(
-        plan.specimen, plan.rig.magnet.magnet(), seed=seed,
+        plan.specimen, plan.rig.magnet.magnet(), seed=seed, truth=truth,
         gravity_m_s2=plan.gravity_m_s2,
     )  # fmt: skip
     devices = open_twin(
@@ -81,7 +84,9 @@ def open_twin_bench(
     return bench, devices
 
 
-def run_on_twin(plan: Plan, folder: Path, *, seed: int) -> tuple[TwinBench, RunSummary]:
+def run_on_twin(
+    plan: Plan, folder: Path, *, seed: int, truth: HiddenTruth | None = None
+) -> tuple[TwinBench, RunSummary]:
     """Carry a plan out on its twin bench.
 
     Returns
@@ -99,7 +104,9 @@ def run_on_twin(plan: Plan, folder: Path, *, seed: int) -> tuple[TwinBench, RunS
     folder.mkdir(parents=True, exist_ok=True)
     clock = SteppedClock()
     with contextlib.closing(WireLog(folder / "wire.log", clock)) as log:
-        bench, devices = open_twin_bench(plan, seed=seed, clock=clock, log=log)
+        bench, devices = open_twin_bench(
+            plan, seed=seed, clock=clock, log=log, truth=truth
+        )
         with closing_all(devices):
             summary = run(plan, devices, folder, twin=True)
     if summary.status != "success":
@@ -140,7 +147,9 @@ def measure_twin(bench: TwinBench, folder: Path, calibration: Calibration) -> in
     return extract_files([folder], folder, setting=setting).measured
 
 
-def bench_run(folder: Path, *, specimen: Specimen, seed: int) -> None:
+def bench_run(
+    folder: Path, *, specimen: Specimen, seed: int, truth: HiddenTruth | None = None
+) -> None:
     """Run a specimen at the paper's three gaps on the twin bench and measure it.
 
     Parameters
@@ -151,11 +160,13 @@ def bench_run(folder: Path, *, specimen: Specimen, seed: int) -> None:
         The nominal rod.
     seed : int
         Which hidden truth the bench gets.
+    truth : HiddenTruth, optional
+        Given in place of the seeded one.
     """
     with tempfile.TemporaryDirectory() as inputs:
         write_templates(Path(inputs), twin=True)
         text = json.dumps(specimen_dict(specimen), indent=1)
         write_text(Path(inputs) / "specimen.toml", text)
         plan = read_plan(Path(inputs) / "plan.toml")
-        bench, _ = run_on_twin(plan, folder, seed=seed)
+        bench, _ = run_on_twin(plan, folder, seed=seed, truth=truth)
     measure_twin(bench, folder, calibrate_twin(bench, folder))
