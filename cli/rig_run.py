@@ -330,4 +330,4 @@ def _watching(
 
 def _assume(devices: Devices, gap_mm: float | None) -> None:
     if gap_mm is not None:
-        devices.stage.assume_gap(gap_mm, for_run=True)
+        devices.stage.assume_gap(gap_mm)

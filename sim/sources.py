@@ -9,7 +9,6 @@ the box in which rods go. It may be plain Python: it is sampled once, and slow o
 
 from __future__ import annotations
 
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -18,6 +17,7 @@ from pydantic import Field as Key
 
 from ..core.errors import ConfigError, InputError
 from ..core.magnet import Vector
+from ..core.plugins import load_plugin
 from ..core.sources import Coil, Cuboid, Cylinder, Dipole, Gradient, Source, Uniform
 from ..core.specimen_file import read_magnet
 from ..core.toml import FileModel, read_toml
@@ -132,7 +132,7 @@ def _source(path: Path, number: int, table: _Other) -> Source:
     where = f"{path}: source {number} ({table.kind})"
     try:
         if table.kind not in _KINDS:
-            return _other(where, keys)
+            return _other(keys)
         model, build = _KINDS[table.kind]
         given = {
             key: value
@@ -154,12 +154,8 @@ def _source(path: Path, number: int, table: _Other) -> Source:
     return source
 
 
-def _other(where: str, keys: dict[str, Any]) -> Source:
+def _other(keys: dict[str, Any]) -> Source:
     """Return a source of a kind that another package offers."""
     kind = keys.pop("kind")
-    found = {point.name: point for point in entry_points(group=GROUP)}
-    if kind not in found:
-        known = ", ".join(sorted([*_KINDS, *found]))
-        raise ConfigError(f"{where}: kind must be one of {known}; instead {kind!r}")
-    custom = found[kind].load()(**keys)
+    custom = load_plugin(GROUP, kind, own=_KINDS)(**keys)
     return sampled_map(custom.flux_mT, custom.box_mm)

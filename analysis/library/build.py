@@ -14,7 +14,7 @@ from __future__ import annotations
 import hashlib
 import json
 import platform
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -137,7 +137,7 @@ def solve_partition(space: Space, out: Path, index: int) -> int:
     for start in range(designs.start, designs.stop, ROWS_PER_CALL):
         stop = min(start + ROWS_PER_CALL, designs.stop)
         chunk: Columns = {"design": np.arange(start, stop, dtype=np.int64)}
-        chunk.update(describe_designs(space.rows(start, stop)))
+        chunk.update(describe_designs(space.rows(start, stop), space.descriptors))
         chunks.append(chunk)
     columns: dict[str, Any] = {
         name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0]
@@ -155,8 +155,11 @@ def solve_partition(space: Space, out: Path, index: int) -> int:
     return index
 
 
-def describe_designs(designs: Designs) -> Columns:
-    """Solve designs; return the columns of their rows in the library."""
+def describe_designs(designs: Designs, more: Sequence[str] = ()) -> Columns:
+    """Solve designs; return the columns of their rows in the library.
+
+    `more` names descriptors of other packages (``magbend.descriptors``).
+    """
     columns: Columns = {}
     for i in range(designs.length_mm.shape[1]):
         columns[f"length{i + 1}_mm"] = designs.length_mm[:, i]
@@ -172,6 +175,9 @@ def describe_designs(designs: Designs) -> Columns:
     solved = solve_shapes(designs, points=POINTS)
     described = descriptors.describe(solved.points)
     for name, column in zip(descriptors.COLUMNS, described.T, strict=True):
+        columns[name] = column.astype(np.float32)
+    for name in more:
+        column = descriptors.describe_by(name, solved.points)
         columns[name] = column.astype(np.float32)
     for percent in STATIONS:
         at = solved.points[:, percent * (POINTS - 1) // 100]

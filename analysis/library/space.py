@@ -165,6 +165,7 @@ class Space(FileModel):
     angle_deg: AnyAxis = ONE_ANGLE
     gap_mm: PositiveAxis | None = None
     magnet: MagnetModel | None = None
+    descriptors: tuple[str, ...] = ()
     section: list[SpaceSection] = Field(min_length=1)
 
     def model_post_init(self, _context: object) -> None:

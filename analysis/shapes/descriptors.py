@@ -13,7 +13,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.errors import InputError
 from ...core.jit import njit
+from ...core.plugins import load_plugin
 from ...sim.batch import ROWS_PER_CALL, in_threads
 
 Array = NDArray[np.float64]
@@ -47,6 +49,42 @@ def describe(shapes: Array) -> Array:
         lambda rows: _describe(shapes[rows], out[rows]), len(shapes), ROWS_PER_CALL
     )
     return out
+
+
+def describe_by(name: str, shapes: Array) -> Array:
+    """Return a descriptor that another package offers (``magbend.descriptors``).
+
+    Parameters
+    ----------
+    name : str
+        The entry point's; it is a function of shapes that returns one number each.
+    shapes : ndarray, shape (n, points, 5)
+        As of `describe`.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+
+    Raises
+    ------
+    ConfigError
+        If nobody offers it or it cannot be loaded.
+    InputError
+        If it fails, or returns anything but n numbers.
+    """
+    function = load_plugin("magbend.descriptors", name, own=COLUMNS)
+    try:
+        values = np.asarray(function(shapes), dtype=np.float64)
+    except Exception as error:  # whatever a stranger's function does
+        raise InputError(
+            f"the descriptor {name!r} fails: {type(error).__name__}: {error}"
+        ) from None
+    if values.shape != (len(shapes),):
+        raise InputError(
+            f"the descriptor {name!r} must return {len(shapes)} numbers, one a shape; "
+            f"instead it returned shape {values.shape}"
+        )
+    return values
 
 
 @njit(cache=True, nogil=True)

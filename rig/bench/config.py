@@ -234,14 +234,12 @@ def _why_not_there(gap_mm: float, rig: RigModel) -> tuple[str, str] | None:
         high = f"{limits.max_gap_mm:g} mm"
         return f"is beyond the largest gap of {high}", "limits.max_gap_mm"
     # Boards count from a switch, into the negative or into the positive.
-    zero_mm, travel_mm = stage.gap_at_zero_mm, stage.travel_mm
-    if stage.homing != "switches" or travel_mm is None or zero_mm is None:
-        return None
-    machine_mm = abs(gap_mm - zero_mm)
-    if machine_mm > travel_mm:
+    machine_mm = abs(gap_mm - stage.gap_at_zero_mm)
+    has_switches = stage.homing == "switches"
+    if has_switches and stage.travel_mm is not None and machine_mm > stage.travel_mm:
         return (
             f"lies {machine_mm:g} mm from the machine's zero, beyond its travel of "
-            f"{travel_mm:g} mm",
+            f"{stage.travel_mm:g} mm",
             "stage.travel_mm, gap_at_zero_mm",
         )
     return None

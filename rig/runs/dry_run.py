@@ -20,10 +20,8 @@ class PlannedStep:
     ----------
     index : int
         From 0.
-    gap_mm : float
-        The gap.
-    stage_mm : float or None
-        Position in the stage's own frame; None on a bench that was never measured.
+    gap_mm, stage_mm : float
+        Gap, and position in the stage's own frame.
     move_mm : float
         Distance from the step before (from the farthest gap, for the first).
     time_s : float
@@ -32,7 +30,7 @@ class PlannedStep:
 
     index: int
     gap_mm: float
-    stage_mm: float | None
+    stage_mm: float
     move_mm: float
     time_s: float
 
@@ -50,7 +48,7 @@ def plan_steps(plan: Plan) -> tuple[PlannedStep, ...]:
     )  # fmt: skip
     acceleration = stage.acceleration_mm_s2 or 10.0
     speed_mm_s = stage.feed_mm_min / 60.0
-    here_mm, zero = limits.max_gap_mm, stage.gap_at_zero_mm
+    here_mm = limits.max_gap_mm
     steps = []
     for index, gap_mm in enumerate(plan.gaps_mm):
         move_mm = here_mm - gap_mm
@@ -61,7 +59,7 @@ def plan_steps(plan: Plan) -> tuple[PlannedStep, ...]:
                 gap_mm=gap_mm,
                 move_mm=move_mm,
                 time_s=move_s + fixed_s,
-                stage_mm=None if zero is None else (gap_mm - zero) / stage.direction,
+                stage_mm=(gap_mm - stage.gap_at_zero_mm) / stage.direction,
             )
         )
         here_mm = gap_mm

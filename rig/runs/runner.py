@@ -23,11 +23,10 @@ from ..camera.protocol import brightness, encode_png, grab_median
 from ..errors import StoppedError
 from ..interrupts import Interrupts, StopAtOnce, interrupts
 from ..meter.protocol import Flux
-from ..stage.gap_records import MoveRecord
+from ..stage.gap import MoveRecord
 from .control import Report, RunControl, quiet
 from .folder import RunFolder
 from .manifest import make_manifest, require_same
-from .map_check import require_same_map
 from .read import is_run, read_run
 from .records import Record, image_name
 from .resume_check import verify_position
@@ -117,11 +116,8 @@ def run(
         manifest = make_manifest(plan, devices, twin=twin)
         is_resumed = resume and is_run(out)
         if is_resumed:
-            begun = read_run(out).manifest
-            require_same(begun, manifest)
-            require_same_map(begun, manifest)
+            require_same(read_run(out).manifest, manifest)
             folder = RunFolder.reopen(out)
-            folder.start_session({k: manifest[k] for k in ("map", "assumed_gap")})
         else:
             folder = RunFolder.create(out, manifest, plan.text)
         control = control or RunControl()
@@ -154,7 +150,6 @@ class _Session:
         self.report = report
         self.received = received
         self.flagged: list[str] = []
-        self.stop_before = devices.stage.last_stop
         self.reference_brightness: float | None = None
 
     def carry_out(self, is_resumed: bool, progress: Progress) -> tuple[str, str]:
@@ -246,8 +241,6 @@ class _Session:
             "gap_mm": gap_mm,
             "gap_reached_mm": move.gap_mm,
             "stage_mm": move.stage_mm,
-            "gap_at_zero_mm": devices.stage.place_map.gap_at_zero_mm,
-            "direction": devices.stage.place_map.direction,
             "approach": move.approach,
             "move_s": move.duration_s,
             **_flux_record(flux),
@@ -304,12 +297,9 @@ class _Session:
         """Bring the stage to a stand and write the ending, whatever happens."""
         stage = self.devices.stage
         if status != "success" or stage.stop_requested():
-            proof = stage.last_stop
             self._halt()
-            if proof is self.stop_before:  # what ended the run stopped no motion
-                proof = stage.last_stop
-            if status == "abort" and proof and proof.sentence() not in reason:
-                reason = f"{reason}: {proof.sentence()}"
+            if status == "abort" and stage.last_stop is not None:
+                reason = f"{reason}: {stage.last_stop.sentence()}"
         try:
             self.folder.finish(status, reason)
         except MagbendError as error:

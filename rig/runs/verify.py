@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from ...core.errors import StoreError
-from .map_check import map_problems
 from .read import Run, read_run
 from .records import IMAGES, PLAN_FILE, Record, sha256_of_file
 
@@ -26,7 +25,6 @@ def verify_run(path: Path) -> list[str]:
     if not (path / PLAN_FILE).is_file():
         problems.append(f"{PLAN_FILE}: missing")
     problems += _steps(run)
-    problems += map_problems(run)
     if run.end is not None:
         hashes = run.end.get("sha256", {})
         problems += [

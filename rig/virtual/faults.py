@@ -8,7 +8,7 @@ from typing import Any
 
 from ..bench.twin_config import FaultConfig
 from ..clock import Clock
-from .board.file import Board
+from .board.firmware import GrblBoard
 from .camera import VirtualCamera
 from .meter import VirtualMeter
 
@@ -27,7 +27,7 @@ _TROUBLES: dict[str, str] = {
 class TwinParts:
     """What faults strike: the devices of a twin, and its time."""
 
-    board: Board
+    board: GrblBoard
     camera: VirtualCamera
     meter: VirtualMeter
     clock: Clock
@@ -93,7 +93,7 @@ def _on_device(fault: FaultConfig, twin: TwinParts) -> Strike | None:
     return strike
 
 
-def _on_board(fault: FaultConfig, board: Board) -> Strike:
+def _on_board(fault: FaultConfig, board: GrblBoard) -> Strike:
     """Return what does the fault to the board, and mends it when its time is over."""
     for_s = fault.for_s or _EVER_S
 

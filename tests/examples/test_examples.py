@@ -88,3 +88,13 @@ def test_designs_bend_to_the_wanted_radius(folder: Path) -> None:
         radius_mm = fit_circle(line.points_mm).radius_mm
         assert radius_mm == pytest.approx(module.RADIUS_MM, rel=0.005)
     assert (folder / "design_backwards.svg").is_file()
+
+
+def test_a_field_from_behind_makes_a_hook(folder: Path) -> None:
+    hooks = example("hook_descriptor").main(folder)
+    for flux_mT, hook_mm in hooks.items():
+        field = sim.UniformField(flux_mT=flux_mT, angle_deg=150.0)
+        line = sim.solve(sim.gmc(2), field).centreline
+        # A rod hooks back exactly if its tip has turned beyond the upright.
+        assert (hook_mm > 0.0) == (line.theta_rad[-1] > np.pi / 2.0)
+    assert hooks[800.0] > 5.0

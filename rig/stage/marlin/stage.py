@@ -56,8 +56,6 @@ class MarlinStage(SerialStage[MarlinSession]):
             driver="marlin", firmware=firmware, port=link.port, details=tuple(lines)
         )
         self._trust.watch(session)
-        self._map_doubt, self._is_lent = "", False
-        self._compare_with_measured()
         return session
 
     def home(self) -> None:
@@ -109,7 +107,7 @@ class MarlinStage(SerialStage[MarlinSession]):
         return StageStatus(
             state="idle" if trouble is None else "alarm" if lost else "silent",
             machine_mm=here,
-            position_state=self.position_state,
+            position_state=self._trust.state,
             trouble=trouble if lost else None,
         )
 
