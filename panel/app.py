@@ -25,7 +25,7 @@ from .controls import NotYoursError
 from .guard import CLIENT_HEADER, Guard
 from .hub import dump
 from .panel import Panel
-from .queries import QUERIES, run_file
+from .queries import QUERIES, File, run_file
 
 STATIC = Path(__file__).parent / "static"
 _MOST_BYTES = 1_000_000
@@ -113,8 +113,8 @@ async def _run_file(panel: Panel, request: Request) -> Response:
         )
     except MagbendError as error:
         return _refused(404, str(error))
-    if isinstance(found, bytes):
-        return Response(found, media_type="image/jpeg")
+    if isinstance(found, File):
+        return Response(found.data, media_type=found.kind)
     headers = {}
     if found.suffix == ".html":
         headers["Content-Security-Policy"] = _REPORT_POLICY
@@ -145,8 +145,8 @@ async def _answer(work: Callable[[], Any]) -> Response:
         return _refused(200, str(error), why="not yours")
     except MagbendError as error:
         return _refused(200, str(error), why="refused")
-    if isinstance(found, bytes):
-        return Response(found, media_type="image/jpeg")
+    if isinstance(found, File):
+        return Response(found.data, media_type=found.kind)
     return Response(dump(found), media_type="application/json")
 
 

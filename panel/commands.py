@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from concurrent.futures import TimeoutError as StillGoing
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ..core.checks import finite
 from ..core.errors import InputError, MagbendError, StageError
+from .arguments import Arguments, Outcome, number
 from .bench.parts import Parts
 from .runs import actions as run_actions
+from .setup import actions as setup_actions
 
 if TYPE_CHECKING:
     from .panel import Panel
-
-Arguments = Mapping[str, Any]
-Outcome = dict[str, Any]
 
 ANSWER_S = 0.6
 """A move that is refused is refused within this time; one that goes on is shown."""
@@ -85,27 +83,27 @@ def _stop(panel: Panel, _arguments: Arguments) -> Outcome:
 
 
 def _connect(panel: Panel, _arguments: Arguments) -> Outcome:
-    _refuse_during_run(panel)
+    panel.require_free()
     panel.owner.release()
     panel.sight.forget()
     return _wait(panel.owner.open(), "connecting")
 
 
 def _home(panel: Panel, _arguments: Arguments) -> Outcome:
-    _refuse_during_run(panel)
+    panel.require_free()
     return _wait(
         panel.owner.submit("homing", lambda parts: _stage(parts).home()), "homing"
     )
 
 
 def _goto(panel: Panel, arguments: Arguments) -> Outcome:
-    _refuse_during_run(panel)
+    panel.require_free()
     gap_mm = number(arguments, "gap_mm", "mm")
     return _go(panel, lambda _here_mm: gap_mm, gap_mm)
 
 
 def _jog(panel: Panel, arguments: Arguments) -> Outcome:
-    _refuse_during_run(panel)
+    panel.require_free()
     step_mm = number(arguments, "step_mm", "mm")
     if not 0.0 < abs(step_mm) <= MOST_JOG_MM:
         raise InputError(
@@ -134,7 +132,7 @@ def _go(
 
 
 def _recover(panel: Panel, _arguments: Arguments) -> Outcome:
-    _refuse_during_run(panel)
+    panel.require_free()
     return _wait(
         panel.owner.submit("recovering", lambda parts: _stage(parts).recover()),
         "recovering",
@@ -142,7 +140,7 @@ def _recover(panel: Panel, _arguments: Arguments) -> Outcome:
 
 
 def _unlock(panel: Panel, arguments: Arguments) -> Outcome:
-    _refuse_during_run(panel)
+    panel.require_free()
     sure = arguments.get("confirm") is True
     return _wait(
         panel.owner.submit(
@@ -158,13 +156,6 @@ def _stage(parts: Parts) -> Any:
     return parts.stage
 
 
-def _refuse_during_run(panel: Panel) -> None:
-    if panel.supervisor.is_running:
-        raise StageError(
-            "a run has the bench; wait for its end, or abort it on the page Run"
-        )
-
-
 def _wait(future: Any, what: str) -> Outcome:
     """Return at once what is refused at once; a motion goes on by itself."""
     try:
@@ -172,22 +163,6 @@ def _wait(future: Any, what: str) -> Outcome:
     except StillGoing:
         return {"text": what, "going": True}
     return {"text": f"{what}: done"}
-
-
-def number(arguments: Arguments, name: str, unit: str) -> float:
-    """Return a number of the arguments.
-
-    Raises
-    ------
-    InputError
-        If it is missing or not finite.
-    """
-    value = arguments.get(name)
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise InputError(
-            f"{name} must be a number in {unit}; instead received {value!r}"
-        )
-    return finite(value, name, unit)
 
 
 COMMANDS: dict[str, Command] = {
@@ -206,5 +181,17 @@ COMMANDS: dict[str, Command] = {
     "run-resume": Command(do=run_actions.resume_run),
     "run-abort": Command(do=run_actions.abort_run, needs_controls=False),
     "job": Command(do=run_actions.start_job),
+    "setup-begin": Command(do=setup_actions.begin),
+    "setup-rig": Command(do=setup_actions.set_rig),
+    "setup-gap": Command(do=setup_actions.set_gap),
+    "setup-show-board": Command(do=setup_actions.show_board),
+    "setup-take-board": Command(do=setup_actions.take_board),
+    "setup-forget-board": Command(do=setup_actions.forget_board),
+    "setup-calibrate": Command(do=setup_actions.calibrate),
+    "setup-height": Command(do=setup_actions.set_height),
+    "setup-zero": Command(do=setup_actions.zero_meter),
+    "setup-scan": Command(do=setup_actions.scan_magnet),
+    "setup-specimen": Command(do=setup_actions.set_specimen),
+    "setup-done": Command(do=setup_actions.mark_step),
 }
 """Every command by its name in the address of a POST."""

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
-from datetime import UTC, datetime
 from typing import Any
 
-from ..core.errors import CameraError, MagbendError
+from ..core.errors import CameraError, MagbendError, RigError
 from .bench.field import FieldWatch
 from .bench.owner import BenchOwner
 from .bench.parts import Parts, Twin, is_twin, open_parts
@@ -19,12 +18,7 @@ from .journal import Journal
 from .runs.jobs import Jobs
 from .runs.supervisor import Supervisor
 from .state import compose
-from .workspace import Workspace
-
-
-def utc_now() -> str:
-    """Return the time of day in UTC, to the second."""
-    return datetime.now(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
+from .workspace import Workspace, utc_now
 
 
 class Panel:
@@ -60,7 +54,7 @@ class Panel:
         self.jobs = Jobs(workspace, self.hub.changed)
         self._number = 0
         self._after_s = 0.0
-        self._follow: Any = None
+        self._last: Any = None
         self._pose: Any = None
         self._begun = threading.Event()
 
@@ -86,6 +80,17 @@ class Panel:
             self.field.close()
             self.owner.close()
             self.jobs.close()
+
+    def require_free(self) -> None:
+        """Refuse while a run has the bench.
+
+        Raises
+        ------
+        RigError
+            If one has.
+        """
+        if self.supervisor.is_running:
+            raise RigError("a run has the bench; wait for its end, or abort it")
 
     @property
     def is_twin(self) -> bool:
@@ -118,7 +123,7 @@ class Panel:
         )  # fmt: skip
 
     def _measure(self, picture: Picture) -> dict[str, Any]:
-        from ..vision import Setting, as_photo, measure
+        from ..vision import Setting, as_photo, follow
 
         files = self.workspace.files()
         calibration = files.calibration
@@ -131,7 +136,8 @@ class Panel:
             joints_mm=rod.joints_mm if rod else (),
             length_mm=rod.length_mm if rod else None,
         )
-        measured = measure(as_photo(picture.image), setting)
+        measured = follow(as_photo(picture.image), setting, self._last)
+        self._last = measured
         if measured.pose is not None:
             self._pose = measured.pose
         predicted: dict[str, Any] = {}

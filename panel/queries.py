@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,12 +13,25 @@ from ..core.errors import InputError, MagbendError, StoreError
 from .bench.sight import pack
 from .runs.listing import list_runs, run_detail
 from .runs.plan_file import check_plan, plan_values
+from .setup import board
+from .setup.magnet import judge_newest_scan
+from .setup.steps import setup_state
 from .workspace import require
 
 if TYPE_CHECKING:
     from .panel import Panel
 
 Query = Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class File:
+    """A file that is made when it is asked for."""
+
+    data: bytes
+    kind: str
+
+
 SERVED = {".png", ".jpg", ".jpeg", ".html", ".pdf", ".svg", ".csv", ".json", ".toml"}
 """What of a run folder is shown."""
 
@@ -38,11 +53,26 @@ def _plan(panel: Panel, query: Query) -> Any:
     return check_plan(panel.workspace, values)
 
 
-def _picture(panel: Panel, _query: Query) -> bytes:
-    return pack(panel.snapshot()).jpeg
+def _picture(panel: Panel, _query: Query) -> File:
+    return File(data=pack(panel.snapshot()).jpeg, kind="image/jpeg")
 
 
-def run_file(panel: Panel, run: str, path: str, width: str) -> Path | bytes:
+def _board_pdf(_panel: Panel, _query: Query) -> File:
+    from ..vision import write_board
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "board.pdf"
+        write_board(board.board_of(), path)
+        return File(data=path.read_bytes(), kind="application/pdf")
+
+
+def _ports(_panel: Panel, _query: Query) -> Any:
+    from ..rig import list_ports
+
+    return [asdict(port) for port in list_ports()]
+
+
+def run_file(panel: Panel, run: str, path: str, width: str) -> Path | File:
     """Return a file of a run folder, or a small JPEG of a photograph in it.
 
     Raises
@@ -62,7 +92,7 @@ def run_file(panel: Panel, run: str, path: str, width: str) -> Path | bytes:
     return _small(found, int(width))
 
 
-def _small(path: Path, width: int) -> bytes:
+def _small(path: Path, width: int) -> File:
     import cv2
 
     image = cv2.imread(str(path), cv2.IMREAD_COLOR)
@@ -70,12 +100,17 @@ def _small(path: Path, width: int) -> bytes:
         raise MagbendError(f"{path.name} is no picture")
     height = max(1, round(image.shape[0] * width / image.shape[1]))
     small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
-    return bytes(cv2.imencode(".jpg", small)[1].tobytes())
+    return File(data=cv2.imencode(".jpg", small)[1].tobytes(), kind="image/jpeg")
 
 
 QUERIES: dict[str, Callable[[Panel, Query], Any]] = {
     "plan": _plan,
     "picture": _picture,
+    "setup": lambda panel, _query: setup_state(panel),
+    "board": lambda panel, _query: board.look(panel),
+    "ports": _ports,
+    "board-pdf": _board_pdf,
+    "scan": lambda panel, _query: judge_newest_scan(panel.workspace),
     "runs": lambda panel, _query: list_runs(panel.workspace),
     "run": lambda panel, query: run_detail(panel.workspace, query.get("name", "")),
 }

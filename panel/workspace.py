@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,18 @@ if TYPE_CHECKING:
     from ..vision import Calibration
 
 RUNS = "runs"
+
+
+def utc_now() -> str:
+    """Return the time of day in UTC, to the second."""
+    return datetime.now(UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
+
+
+def now_name() -> str:
+    """Return the time here, as names of folders begin with it."""
+    return f"{datetime.now().astimezone():%Y-%m-%d_%H%M%S}"
+
+
 _FIT_BYTES = 20_000_000
 
 

@@ -13,6 +13,9 @@ from .bench.config import (
 from .bench.devices import (
     Devices as Devices,
 )
+from .bench.file_edit import (
+    replace_gap_at_zero as replace_gap_at_zero,
+)
 from .bench.open import (
     open_camera as open_camera,
 )
@@ -27,6 +30,9 @@ from .bench.open import (
 )
 from .bench.template import (
     write_templates as write_templates,
+)
+from .camera.protocol import (
+    encode_png as encode_png,
 )
 from .clock import (
     Clock as Clock,
@@ -55,6 +61,9 @@ from .errors import StageTimeoutError as StageTimeoutError
 from .errors import StoppedError as StoppedError
 from .link import (
     WireLog as WireLog,
+)
+from .meter.description import (
+    ready_meters as ready_meters,
 )
 from .ports import (
     PortInfo as PortInfo,

@@ -67,6 +67,9 @@ from .magnet.map import (
 from .magnet.map import (
     sampled_map as sampled_map,
 )
+from .magnet.readings import (
+    read_readings as read_readings,
+)
 from .one_rod import (
     solve as solve,
 )

@@ -31,6 +31,9 @@ from .batch.tables import (
 from .camera.board import (
     Board as Board,
 )
+from .camera.board import (
+    find_corners as find_corners,
+)
 from .camera.board_print import (
     write_board as write_board,
 )

@@ -3,33 +3,29 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
-from ...core.errors import ConfigError, InputError, RigError
-from ..bench.parts import is_twin
-from ..workspace import require
+from ...core.errors import ConfigError, InputError
+from ..arguments import Arguments, Outcome
+from ..workspace import now_name, require
 from .plan_file import write_plan
 
 if TYPE_CHECKING:
     from ..panel import Panel
 
-Arguments = Mapping[str, Any]
 TWIN_SPEED = 4.0
 """How many times as fast as the wall clock a run on the computed bench goes."""
 
 
-def save_plan(panel: Panel, arguments: Arguments) -> dict[str, Any]:
+def save_plan(panel: Panel, arguments: Arguments) -> Outcome:
     """Write the plan file, if the plan can be carried out."""
     write_plan(panel.workspace, arguments)
     return {"text": f"{panel.workspace.plan_path.name} written"}
 
 
-def start_run(panel: Panel, arguments: Arguments) -> dict[str, Any]:
+def start_run(panel: Panel, arguments: Arguments) -> Outcome:
     """Let go of the bench and start ``magbend rig run`` in its own process."""
-    if panel.supervisor.is_running:
-        raise RigError("a run has the bench already; wait for its end, or abort it")
+    panel.require_free()
     files = panel.workspace.files()
     plan = require(files.plan, files.problems, "plan")
     name = str(arguments.get("resume") or "")
@@ -40,7 +36,7 @@ def start_run(panel: Panel, arguments: Arguments) -> dict[str, Any]:
     ]  # fmt: skip
     if name:
         command.append("--resume")
-    if is_twin(panel.workspace):
+    if panel.is_twin:
         speed = TWIN_SPEED * panel.twin.speed
         command += ["--seed", str(panel.twin.seed), "--speed", f"{speed:g}"]
     command += _readings(arguments, len(plan.gaps_mm))
@@ -52,8 +48,7 @@ def start_run(panel: Panel, arguments: Arguments) -> dict[str, Any]:
 
 def _new_folder(panel: Panel, plan: Any) -> Any:
     name = re.sub(r"[^\w.-]+", "-", plan.model.name).strip("-") or "run"
-    stem = f"{datetime.now().astimezone():%Y-%m-%d_%H%M%S}_{name}"
-    return panel.workspace.runs_path / stem
+    return panel.workspace.runs_path / f"{now_name()}_{name}"
 
 
 def _readings(arguments: Arguments, count: int) -> list[str]:
@@ -67,22 +62,22 @@ def _readings(arguments: Arguments, count: int) -> list[str]:
     return ["--flux-mT", ",".join(f"{value:g}" for value in values)]
 
 
-def pause_run(panel: Panel, _arguments: Arguments) -> dict[str, Any]:
+def pause_run(panel: Panel, _arguments: Arguments) -> Outcome:
     """Ask the run to pause at its next safe point."""
     return {"text": panel.supervisor.ask("pause")}
 
 
-def resume_run(panel: Panel, _arguments: Arguments) -> dict[str, Any]:
+def resume_run(panel: Panel, _arguments: Arguments) -> Outcome:
     """Let a paused run go on."""
     return {"text": panel.supervisor.ask("resume")}
 
 
-def abort_run(panel: Panel, _arguments: Arguments) -> dict[str, Any]:
+def abort_run(panel: Panel, _arguments: Arguments) -> Outcome:
     """Stop the run: the stage is held, and its ending written."""
     return {"text": panel.supervisor.ask("stop")}
 
 
-def start_job(panel: Panel, arguments: Arguments) -> dict[str, Any]:
+def start_job(panel: Panel, arguments: Arguments) -> Outcome:
     """Queue extract, fit, compare, report, verify or package for runs."""
     what = str(arguments.get("what"))
     names = arguments.get("runs")

@@ -23,6 +23,10 @@ _LINES = 60
 _KEPT = 20
 
 
+def _nothing() -> None:
+    """Do nothing afterwards."""
+
+
 @dataclass(slots=True, kw_only=True)
 class Job:
     """One command, waiting, going on, or done.
@@ -35,12 +39,15 @@ class Job:
         Such as ``extract``, and the name of the run or nothing.
     arguments : tuple of str
         What follows ``magbend``.
+    after : callable
+        Called when it is over, however it ended.
     """
 
     number: int
     what: str
     run: str
     arguments: tuple[str, ...]
+    after: Callable[[], None] = _nothing
     status: str = "waiting"
     lines: deque[str] = field(default_factory=lambda: deque(maxlen=_LINES))
     done: int = 0
@@ -90,8 +97,15 @@ class Jobs:
         with self._lock:
             return [job.facts() for job in reversed(self._jobs)]
 
-    def add(self, what: str, run: str, arguments: Sequence[str]) -> Job:
-        """Queue a command.
+    def add(
+        self,
+        what: str,
+        run: str,
+        arguments: Sequence[str],
+        *,
+        after: Callable[[], None] = _nothing,
+    ) -> Job:
+        """Queue a command; `after` is called when it is over.
 
         Raises
         ------
@@ -104,7 +118,9 @@ class Jobs:
                 if job.arguments == arguments and job.status in ("waiting", "running"):
                     raise InputError(f"{what} of {run} is going on already")
             self._count += 1
-            job = Job(number=self._count, what=what, run=run, arguments=arguments)
+            job = Job(
+                number=self._count, what=what, run=run, arguments=arguments, after=after
+            )
             self._jobs.append(job)
             if self._thread is None or not self._thread.is_alive():
                 self._thread = threading.Thread(
@@ -142,6 +158,7 @@ class Jobs:
                 job.lines.append(f"cannot be started: {error.strerror}")
                 job.status = "failed"
             job.ended_s = time.monotonic()
+            job.after()
             self._changed()
 
     def _carry_out(self, job: Job) -> str:

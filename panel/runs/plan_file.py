@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...core.errors import ConfigError, InputError
-from ...core.files import write_text
+from ...core.errors import InputError
+from ...core.toml import read_text
 from ..bench.theory import Place, predict, shape_mm
-from ..workspace import Workspace, require
+from ..toml_edit import change, edited, read_as
+from ..workspace import Workspace
 
 if TYPE_CHECKING:
     from ...rig import Plan
@@ -42,37 +41,21 @@ def plan_values(plan: Plan) -> dict[str, Any]:
     }
 
 
-def edited(text: str, values: Mapping[str, Any]) -> str:
-    """Return a TOML plan with new values; comments and all else stay.
+def _named(values: Mapping[str, Any]) -> dict[tuple[str, ...], Any]:
+    """Return the values by where they stand in the file.
 
     Raises
     ------
     InputError
-        If a value is given that the editor does not know.
-    ConfigError
-        If the text is no TOML.
+        If one is given that the editor does not know.
     """
-    import tomlkit
-    from tomlkit.exceptions import ParseError
-
-    try:
-        document = tomlkit.parse(text)
-    except ParseError as error:
-        raise ConfigError(f"the plan is not valid TOML: {error}") from None
-    for name, value in values.items():
+    for name in values:
         if name not in PLAN_KEYS:
             raise InputError(
                 f"the plan editor knows {', '.join(PLAN_KEYS)}; instead received "
                 f"{name!r}"
             )
-        *tables, key = PLAN_KEYS[name]
-        table: Any = document
-        for part in tables:
-            if part not in table:
-                table[part] = tomlkit.table()
-            table = table[part]
-        table[key] = value
-    return tomlkit.dumps(document)
+    return {PLAN_KEYS[name]: value for name, value in values.items()}
 
 
 def write_plan(workspace: Workspace, values: Mapping[str, Any]) -> None:
@@ -83,9 +66,9 @@ def write_plan(workspace: Workspace, values: Mapping[str, Any]) -> None:
     ConfigError
         One sentence, as `magbend.rig.read_plan` says it; the file stays as it was.
     """
-    text = edited(_text(workspace), values)
-    _read_beside(workspace, text)
-    write_text(workspace.plan_path, text)
+    from ...rig import read_plan
+
+    change(workspace.plan_path, _named(values), read_plan)
 
 
 def check_plan(workspace: Workspace, values: Mapping[str, Any]) -> dict[str, Any]:
@@ -96,9 +79,10 @@ def check_plan(workspace: Workspace, values: Mapping[str, Any]) -> dict[str, Any
     ConfigError
         If it cannot be carried out; nothing is written.
     """
-    from ...rig import homing_s, plan_steps
+    from ...rig import homing_s, plan_steps, read_plan
 
-    plan = _read_beside(workspace, edited(_text(workspace), values))
+    text = edited(read_text(workspace.plan_path), _named(values))
+    plan = read_as(workspace.plan_path, text, read_plan)
     files = workspace.files()
     rows = []
     for step in plan_steps(plan):
@@ -127,31 +111,3 @@ def flux_mT(files: Any, gap_mm: float) -> float | None:
         return None
     magnet = files.rig.magnet.magnet()
     return model_flux_mT(magnet, files.specimen.length_mm, gap_mm)
-
-
-def _text(workspace: Workspace) -> str:
-    try:
-        return workspace.plan_path.read_text(encoding="utf-8")
-    except OSError:
-        files = workspace.files()
-        require(None, files.problems, "plan")
-        raise
-
-
-def _read_beside(workspace: Workspace, text: str) -> Plan:
-    """Read a plan that is not written yet, as if it lay beside the rig file."""
-    from ...rig import read_plan
-
-    with tempfile.NamedTemporaryFile(
-        "w", dir=workspace.folder, prefix=".plan-", suffix=".toml", encoding="utf-8",
-        delete=False,
-    ) as file:  # fmt: skip
-        file.write(text)
-    path = Path(file.name)
-    try:
-        return read_plan(path)
-    except ConfigError as error:
-        sentence = str(error).replace(str(path), workspace.plan_path.name)
-        raise ConfigError(sentence) from None
-    finally:
-        path.unlink(missing_ok=True)

@@ -5,8 +5,9 @@ import {client, command, connect, isLost, link, on, watchPicture} from "./link.j
 import * as bench from "./bench.js";
 import * as run from "./run.js";
 import * as runs from "./runs.js";
+import * as setup from "./setup.js";
 
-const pages = {bench, run, runs};
+const pages = {setup, bench, run, runs};
 const $ = (id) => document.getElementById(id);
 let current = "";
 
@@ -35,7 +36,7 @@ function show() {
 }
 
 function first() {
-  return link.state && !link.state.files.has_rig_file && pages.setup ? "setup" : "bench";
+  return link.state && !link.state.files.has_rig_file ? "setup" : "bench";
 }
 
 function render() {

@@ -13,7 +13,7 @@ const COLOURS = {measured: "#ff9d2e", "magnet.nominal": "#37c2ff", "magnet.fitte
 const DASHES = {measured: [], "magnet.nominal": [10, 5], "magnet.fitted": [3, 4], "uniform.nominal": [14, 4, 2, 4], "uniform.fitted": [6, 6]};
 
 /** Make the figure; returns {element, render}. */
-export function picture({tools = []} = {}) {
+export function picture({plain = false} = {}) {
   const live = h("canvas", {width: 1600, height: 1200, "aria-hidden": "true"});
   const over = h("canvas", {width: 1600, height: 1200, role: "img", "aria-label": "live picture; the misfits are in the table below"});
   const facts = h("p", {class: "facts"});
@@ -22,10 +22,10 @@ export function picture({tools = []} = {}) {
   const shown = {measured: true, "magnet.nominal": true, "magnet.fitted": true, "uniform.nominal": false, "uniform.fitted": false};
   const element = h("figure", {class: "card picture"},
     h("div", {class: "screen"}, live, over, h("p", {class: "no-picture"}, "no picture yet")),
-    h("figcaption", {}, facts, doubt,
+    h("figcaption", {}, facts, plain ? null : [doubt,
       h("table", {class: "misfits"},
-        h("thead", {}, h("tr", {}, ...["Line", "Misfit, RMS mm", "Tip off, mm", "State"].map((name) => h("th", {scope: "col"}, name)))), rows), ...tools));
-  const screen = {element, live, over, facts, doubt, rows, shown, drawn: null, newest: null, delays: [], rowFor: new Map()};
+        h("thead", {}, h("tr", {}, ...["Line", "Misfit, RMS mm", "Tip off, mm", "State"].map((name) => h("th", {scope: "col"}, name)))), rows)]));
+  const screen = {plain, marks: [], element, live, over, facts, doubt, rows, shown, drawn: null, newest: null, delays: [], rowFor: new Map()};
   on("picture", (news) => { if (!element.closest("[hidden]")) showPicture(screen, news); });
   on("overlay", (news) => { if (!element.closest("[hidden]")) showOverlay(screen, news); });
   new ResizeObserver(() => draw(screen)).observe(element);
@@ -50,7 +50,13 @@ function showOverlay(screen, news) {
   screen.drawn = news;
   screen.delays = [...screen.delays, news.late_ms].slice(-30);
   draw(screen);
-  showMisfits(screen, news);
+  if (!screen.plain) showMisfits(screen, news);
+}
+
+/** Mark points over the picture, in its pixels. */
+export function markPoints(screen, points) {
+  screen.marks = points;
+  draw(screen);
 }
 
 function draw(screen) {
@@ -62,12 +68,24 @@ function draw(screen) {
   over.height = Math.round(box.height * ratio);
   const pen = over.getContext("2d");
   pen.clearRect(0, 0, over.width, over.height);
-  if (!drawn || !newest) return;
+  if (!newest) return;
   pen.scale(over.width / (newest.size?.[0] ?? live.width), over.height / (newest.size?.[1] ?? live.height));
   const width = (newest.size?.[0] ?? live.width) / box.width;
+  for (const [x, y] of screen.marks) dot(pen, x, y, width);
+  if (!drawn || screen.plain) return;
   for (const [name, shape] of Object.entries(drawn.predicted ?? {}))
     if (screen.shown[name] && shape.px) stroke(pen, shape.px, COLOURS[name], DASHES[name], width, 2.5);
   if (screen.shown.measured && drawn.measured_px?.length) stroke(pen, drawn.measured_px, COLOURS.measured, [], width, 2);
+}
+
+function dot(pen, x, y, width) {
+  pen.beginPath();
+  pen.arc(x, y, 4 * width, 0, 7);
+  pen.fillStyle = "#37c2ff";
+  pen.fill();
+  pen.lineWidth = 1.5 * width;
+  pen.strokeStyle = "rgba(0,0,0,.6)";
+  pen.stroke();
 }
 
 function stroke(pen, points, colour, dash, width, weight) {

@@ -13,7 +13,8 @@ import pytest
 
 from magbend.core.errors import ConfigError, InputError
 from magbend.panel import Workspace
-from magbend.panel.runs.plan_file import check_plan, edited, write_plan
+from magbend.panel.runs.plan_file import check_plan, write_plan
+from magbend.panel.toml_edit import edited
 
 from .panel_server import Served, served
 
@@ -97,12 +98,13 @@ def test_a_run_that_is_killed_can_be_resumed(panel: Served) -> None:
 
 def test_the_editor_keeps_the_comments_of_a_plan(bench: Path) -> None:
     text = (bench.parent / "plan.toml").read_text()
-    changed = edited(text, {"gaps_mm": [80.0, 65.0], "settle_s": 1.5})
+    values = {("gaps_mm",): [80.0, 65.0], ("settle", "time_s"): 1.5}
+    changed = edited(text, values)
     assert "# when is the rod still?" in changed
     assert "gaps_mm = [80.0, 65.0]" in changed
     assert "time_s = 1.5" in changed
     with pytest.raises(InputError, match="the plan editor knows"):
-        edited(text, {"feed": 3})
+        write_plan(Workspace(bench), {"feed": 3})
 
 
 @pytest.mark.parametrize(
@@ -126,7 +128,7 @@ def test_a_plan_that_cannot_be_is_refused_and_nothing_is_written(
         write_plan(workspace, values)
     assert sentence in str(refused.value)
     assert workspace.plan_path.read_bytes() == before
-    assert not list(workspace.folder.glob(".plan-*"))
+    assert not list(workspace.folder.glob(".edited-*"))
 
 
 def test_a_plan_is_foreseen_step_by_step(bench: Path) -> None:
