@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -32,17 +32,14 @@ class Watch:
 
 
 @contextlib.contextmanager
-def chromium() -> Iterator[Any]:
-    """Yield the browser; skip where there is none."""
+def launcher() -> Iterator[Callable[[], Any]]:
+    """Yield what starts a browser; skip where there is none."""
     playwright = pytest.importorskip("playwright.sync_api")
     path = shutil.which("chromium") or shutil.which("chromium-browser")
     if path is None:
         pytest.skip("no Chromium on the PATH: the browser tests did not run")
     with playwright.sync_playwright() as running:
-        browser = running.chromium.launch(executable_path=path, args=_ARGUMENTS)
-        yield browser
-        with contextlib.suppress(Exception):
-            browser.close()
+        yield lambda: running.chromium.launch(executable_path=path, args=_ARGUMENTS)
 
 
 def open_page(

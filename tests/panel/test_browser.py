@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from .browser import chromium, open_page, shoot
+from .browser import launcher, open_page, shoot
 from .panel_server import Served, served
 
 pytestmark = pytest.mark.browser
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as found:
+def launch() -> Iterator[Callable[[], Any]]:
+    with launcher() as found:
         yield found
+
+
+@pytest.fixture(scope="module")
+def browser(launch: Callable[[], Any]) -> Iterator[Any]:
+    found = launch()
+    yield found
+    found.close()
+
+
+def free_controls(panel: Served) -> None:
+    panel.command("take", over=True)
+    panel.command("release")
 
 
 def expect(locator: Any) -> Any:
@@ -91,7 +103,7 @@ def test_the_set_up_is_walked_from_nothing_to_a_dry_run(
 
 def test_theory_is_drawn_over_the_live_picture(browser: Any, panel: Served) -> None:
     page, watch = open_page(browser, f"{panel.url}#bench")
-    panel.command("release", client="test")
+    free_controls(panel)
     if "homed" not in (page.locator(".chips").inner_text()):
         button(page, "Home").click()
         button(page, "Home it").click()
@@ -120,6 +132,7 @@ def test_theory_is_drawn_over_the_live_picture(browser: Any, panel: Served) -> N
 def test_escape_stops_the_stage_from_a_page_that_only_watches(
     browser: Any, panel: Served
 ) -> None:
+    free_controls(panel)
     mover, _ = open_page(browser, f"{panel.url}#bench")
     watcher, _ = open_page(browser, f"{panel.url}#bench", size="phone", dark=True)
     expect(mover.locator(".chips")).to_contain_text("homed")
@@ -143,32 +156,36 @@ def test_escape_stops_the_stage_from_a_page_that_only_watches(
     watcher.context.close()
 
 
-def test_a_run_goes_on_when_its_browser_is_killed(panel: Served) -> None:
-    panel.command("take", over=True)
-    panel.command("release")
-    with chromium() as first:
-        page, watch = open_page(first, f"{panel.url}#run")
-        page.get_by_label("Gaps, mm").fill("70:60:-10")
-        expect(page.get_by_text("nothing has moved")).to_be_visible()
-        button(page, "Start the run").click()
-        expect(heading(page, "step 1 of 2")).to_be_visible()
-        button(page, "Pause").click()
-        expect(heading(page, "paused")).to_be_visible()
-        shoot(page, "run_paused")
-        button(page, "Go on").click()
-        expect(heading(page, "paused")).to_be_hidden()
-        assert watch.errors == []
-        assert watch.hosts == {panel.netloc}
-    with chromium() as second:
-        page, _ = open_page(second, f"{panel.url}#run")
-        expect(page.get_by_text("success: every step of the plan")).to_be_visible()
-        expect(page.get_by_role("img", name="photograph at 60.0 mm")).to_be_visible()
-        button(page, "Extract").click()
-        expect(button(page, "Extract again")).to_be_visible()
-        shoot(page, "run_extracted")
-        page.goto(f"{panel.url}#runs")
-        expect(page.get_by_role("row", name=re.compile("success"))).to_be_visible()
-        shoot(page, "runs")
+def test_a_run_goes_on_when_its_browser_is_killed(
+    launch: Callable[[], Any], browser: Any, panel: Served
+) -> None:
+    free_controls(panel)
+    killed = launch()
+    page, watch = open_page(killed, f"{panel.url}#run")
+    page.get_by_label("Gaps, mm").fill("70:60:-10")
+    expect(page.get_by_text("nothing has moved")).to_be_visible()
+    button(page, "Start the run").click()
+    expect(heading(page, "step 1 of 2")).to_be_visible()
+    button(page, "Pause").click()
+    expect(heading(page, "paused")).to_be_visible()
+    shoot(page, "run_paused")
+    button(page, "Go on").click()
+    expect(heading(page, "paused")).to_be_hidden()
+    assert watch.errors == []
+    assert watch.hosts == {panel.netloc}
+    killed.close()
+    page, watch = open_page(browser, f"{panel.url}#run")
+    expect(page.get_by_text("success: every step of the plan")).to_be_visible()
+    expect(page.get_by_role("img", name="photograph at 60.0 mm")).to_be_visible()
+    free_controls(panel)
+    button(page, "Extract").click()
+    expect(button(page, "Extract again")).to_be_visible()
+    shoot(page, "run_extracted")
+    page.goto(f"{panel.url}#runs")
+    expect(page.get_by_role("row", name=re.compile("success")).first).to_be_visible()
+    shoot(page, "runs")
+    assert watch.errors == []
+    page.context.close()
 
 
 @pytest.mark.parametrize(
