@@ -22,12 +22,24 @@ def demo(
     seed: int = typer.Option(
         2, "--seed", help="Which hidden truth the twin bench gets."
     ),
+    panel: bool = typer.Option(
+        False, "--panel", help="Play the loop on the control panel instead."
+    ),
+    port: int = typer.Option(8765, "--port", help="Port of the panel; 0: any."),
+    no_browser: bool = typer.Option(
+        False, "--no-browser", help="Print the panel's address; open no browser."
+    ),
 ) -> None:
     """Run the whole loop on the built-in twin bench and write a report.
 
     A simulated board, camera and Tesla-meter stand in for the bench; their rod differs
     from the nominal one by a hidden amount, which the report has to find.
     """
+    if panel:
+        from .panel import open_demo
+
+        open_demo(out, seed=seed, port=port, browser=not no_browser)
+        return
     from ..analysis.demo import run_demo
 
     report = run_demo(out, seed=seed, tell=typer.echo)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 
 import typer
@@ -52,16 +53,39 @@ def open_panel(
     browser: bool = True, seed: int = 1, speed: float = 1.0,
 ) -> None:  # fmt: skip
     """Serve the panel of a rig file until Ctrl-C."""
-    try:
+    with _extra():
         from ..panel import Address, Panel, Twin, Workspace, serve
-    except ModuleNotFoundError as error:
-        raise MissingExtraError(
-            (error.name or "starlette").partition(".")[0], "panel", "the control panel"
-        ) from None
-    from ..analysis.warm_up import main as warm
 
-    address = Address(host=host, port=port, names=names)
-    warm(typer.echo)
-    with contextlib.suppress(KeyboardInterrupt):
-        panel = Panel(Workspace(rig), twin=Twin(seed=seed, speed=speed))
-        serve(panel, address, browser=browser, tell=typer.echo)
+        address = Address(host=host, port=port, names=names)
+        shown = Panel(Workspace(rig), twin=Twin(seed=seed, speed=speed))
+        _warm()
+        with contextlib.suppress(KeyboardInterrupt):
+            serve(shown, address, browser=browser, tell=typer.echo)
+
+
+def open_demo(out: Path, *, seed: int, port: int, browser: bool) -> None:
+    """Serve the panel of a computed bench that is calibrated and ready to run."""
+    with _extra():
+        from ..panel import prepare_demo
+
+        _warm()
+        rig = prepare_demo(out, seed=seed)
+    typer.echo(f"{rig.parent}: a computed bench; home it, go to a gap, start the run")
+    open_panel(rig, port=port, browser=browser, seed=seed, speed=3.0)
+
+
+def _warm() -> None:
+    """Compile the kernels first: while they compile, a page would wait for its stop."""
+    from ..analysis.warm_up import main
+
+    main(lambda text: typer.echo(text.rstrip(), err=True))
+
+
+@contextlib.contextmanager
+def _extra() -> Iterator[None]:
+    """Turn a missing package of the panel into a sentence that names the extra."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        package = (error.name or "starlette").partition(".")[0]
+        raise MissingExtraError(package, "panel", "the control panel") from None

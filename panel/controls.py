@@ -67,7 +67,7 @@ class Controls:
         if before is not None and before.client != client and not over:
             raise NotYoursError(
                 f"{before.name} has held the controls since {before.since_utc}; take "
-                "them over if that person agrees"
+                f"them over if that person agrees"
             )
         with self._lock:
             self._gone_s = None

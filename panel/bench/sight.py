@@ -136,12 +136,13 @@ class Sight:
 
     def forget(self) -> None:
         """Drop the newest picture: it shows another bench than the one to come."""
-        self._newest, self._statistics = None, {}
+        self._newest, self._statistics, self.trouble = None, {}, ""
 
     def _grab_on(self) -> None:
         while not self._ending.is_set():
             pace_s = self._pace_s()
             if pace_s == float("inf"):
+                self.trouble = ""
                 self._ending.wait(REST_S)
                 continue
             begun_s = time.monotonic()

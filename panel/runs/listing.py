@@ -91,6 +91,7 @@ def run_detail(workspace: Workspace, name: str) -> dict[str, Any]:
             "steps": [],
             "planned": 0,
             "has": [],
+            "model_mT": [],
         }
     run = read_run(folder)
     files = workspace.files()

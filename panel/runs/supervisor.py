@@ -26,6 +26,8 @@ LOOK_S = 1.0
 RUN = "rig run"
 _START_S = 20.0
 _PICTURE_S = 3.0
+_BLIND_S = 5.0
+"""How long the run's live view may be silent before it is called a trouble."""
 
 
 class Supervisor:
@@ -48,6 +50,7 @@ class Supervisor:
         self._facts: dict[str, Any] | None = None
         self._starting_s = 0.0
         self._number = 0
+        self._seen_s = 0.0
         self.last_run = ""
         self.log: Path | None = None
         self.over: Callable[[], None] = lambda: None
@@ -135,9 +138,10 @@ class Supervisor:
             ) as answer:
                 data = answer.read(50_000_000)
         except OSError as error:
-            if self._facts is None:
-                return None
+            if time.monotonic() - self._seen_s < _BLIND_S or self._facts is None:
+                return None  # it ends just now, or is busy
             raise CameraError(f"the run's live view does not answer: {error}") from None
+        self._seen_s = time.monotonic()
         return self._decoded(data, facts)
 
     def _decoded(self, data: bytes, facts: dict[str, Any]) -> Picture:
@@ -196,6 +200,8 @@ class Supervisor:
             folder = facts.get("folder")
             if folder and Path(folder).parent == self._workspace.runs_path:
                 self.last_run = Path(folder).name
+            if self._facts is None:
+                self._seen_s = time.monotonic()
             if facts != self._facts:
                 self._facts = facts
                 self._changed()

@@ -114,7 +114,9 @@ export function ask(title, text, yes) {
   say($("ask-title"), title);
   say($("ask-text"), text);
   say($("ask-yes"), yes);
-  dialog.showModal();
+  // Not modal: the stop must stay within reach of pointer and keyboard.
+  dialog.show();
+  $("ask-yes").focus();
   return new Promise((resolve) => {
     dialog.addEventListener("close", () => resolve(dialog.returnValue === "yes"), {once: true});
     dialog.returnValue = "no";
@@ -164,7 +166,9 @@ $("stop").addEventListener("click", stop);
 $("controls").addEventListener("click", controlsPressed);
 $("theme").addEventListener("click", turnTheme);
 addEventListener("keydown", (event) => {
-  if (event.key === "Escape") stop();
+  if (event.key !== "Escape") return;
+  stop();
+  if ($("ask").open) $("ask").close("no");
 }, {capture: true});
 addEventListener("hashchange", show);
 on("state", render);
