@@ -1,0 +1,5 @@
+"""A rod pushed through a lumen: contact, push force, snaps (`docs/navigation.md`)."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

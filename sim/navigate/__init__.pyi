@@ -1,0 +1,12 @@
+from .channels import channel as channel
+from .curves import circle as circle
+from .curves import polyline as polyline
+from .curves import spline as spline
+from .lumen import Gate as Gate
+from .lumen import Lumen as Lumen
+from .lumen import Wall as Wall
+from .passage import Contact as Contact
+from .passage import Event as Event
+from .passage import Passage as Passage
+from .passage import Step as Step
+from .solver import navigate as navigate

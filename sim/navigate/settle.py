@@ -1,0 +1,425 @@
+"""The rod comes to rest in its lumen: Newton on an augmented Lagrangian.
+
+Newton's matrix is exact, so that its Cholesky factor exists if and only if the state is
+a minimum (walls stiff enough given): stability comes free. Where it does not exist the
+stiffness of bending is added until it does, which makes every step a descent, and at a
+saddle the way down is found by inverse iteration.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...core.jit import njit
+from ..magnet.field import inside
+from ..planar.march import PART
+from .rod import Bent, bend, own_energy, own_gradient, own_stiffness, station
+from .touch import (
+    FIXED,
+    FLOATS,
+    MOST,
+    TIP,
+    locate,
+    nearest,
+    touch_energy,
+    touch_gradient,
+)
+from .walls import clearance
+
+SETTLED, RESTLESS, JAMMED, PULLED = range(4)
+"""Outcomes: at rest; no convergence; no room left; pulled onto a magnet."""
+SOFT, HARD = 1e4, 1e6
+"""Stiffness of the walls at first and at last: it decides how fast the gaps close, not
+how far."""
+GAP = 3e-10
+"""Gaps closed to this count as closed, in lengths of the rod."""
+STEPS = 60
+"""Newton's steps for one set of contacts."""
+ROUNDS = 30
+"""Changes of the set of contacts."""
+LONGEST = 0.4
+"""Most that an angle may change in one step, in rad."""
+SMALL = 1e-11
+"""Newton's step after which it is at rest."""
+
+
+@njit(**PART, fastmath={"contract", "reassoc"})
+def factor(H, first, last, L):  # type: ignore[no-untyped-def]
+    """Factor rows and columns `first` to `last` of H; return whether it could."""
+    for i in range(first, last):
+        for j in range(first, i):
+            total = H[i, j]
+            for k in range(first, j):
+                total -= L[i, k] * L[j, k]
+            L[i, j] = total / L[j, j]
+        total = H[i, i]
+        for k in range(first, i):
+            total -= L[i, k] * L[i, k]
+        if not total > 1e-14 * abs(H[i, i]):
+            return False
+        L[i, i] = math.sqrt(total)
+    return True
+
+
+@njit(**PART)
+def solve(L, first, last, b):  # type: ignore[no-untyped-def]
+    """Replace b by the solution of L L^T x = b."""
+    for i in range(first, last):
+        total = b[i]
+        for k in range(first, i):
+            total -= L[i, k] * b[k]
+        b[i] = total / L[i, i]
+    for i in range(last - 1, first - 1, -1):
+        b[i] /= L[i, i]
+        for k in range(first, i):
+            b[k] -= L[i, k] * b[i]
+
+
+@njit(**PART)
+def energy(rod, field, walls, half, reach, u, bent, t, stiff, held, before):  # type: ignore[no-untyped-def]
+    """Bend the rod, bring the contacts up to date, return the augmented energy."""
+    bend(rod, u, bent)
+    locate(rod, u, bent, walls, half, reach, t)
+    total = own_energy(rod, field, u, bent) + touch_energy(t, stiff, before)
+    if rod.grip[0] != 0.0:
+        fx = held[0] - stiff * (bent.x[-1] - rod.grip[1])
+        fy = held[1] - stiff * (bent.y[-1] - rod.grip[2])
+        total += 0.5 * (fx * fx + fy * fy) / stiff
+    return total
+
+
+@njit(**PART)
+def add_grip(rod, bent, held, stiff, px, py, ax, ay, g, H):  # type: ignore[no-untyped-def]
+    """Add what holds the tip to gradient, Hessian and loads."""
+    fx = held[0] - stiff * (bent.x[-1] - rod.grip[1])
+    fy = held[1] - stiff * (bent.y[-1] - rod.grip[2])
+    ax[:] = 0.0
+    ay[:] = 0.0
+    for e in range(rod.stiff.shape[0]):
+        px[e] += fx
+        py[e] += fy
+        for a in range(4):
+            ax[3 * e + a] += bent.dx[e, a]
+            ay[3 * e + a] += bent.dy[e, a]
+    n = ax.shape[0]
+    for a in range(n):
+        g[a] -= fx * ax[a] + fy * ay[a]
+        for c in range(a + 1):
+            H[a, c] += stiff * (ax[a] * ax[c] + ay[a] * ay[c])
+
+
+@njit(**PART)
+def way_down(H, K, L, last, d):  # type: ignore[no-untyped-def]
+    """Set d to a step; return 0 if H is positive, else how much bending was added."""
+    shift = 0.0
+    for _ in range(60):
+        if shift > 0.0:
+            for i in range(1, last):
+                H[i, i] += 0.75 * shift * K[i]
+        if factor(H, 1, last, L):
+            break
+        shift = 0.01 if shift == 0.0 else 4.0 * shift
+    return shift
+
+
+@njit(**PART)
+def softest(L, K, last, d):  # type: ignore[no-untyped-def]
+    """Set d to the softest way out of a saddle, of size 1e-3 rad."""
+    for i in range(1, last):
+        d[i] = 1.0 + 0.3 * math.sin(1.7 * i) if i % 3 == 0 else 0.0
+    for _ in range(8):
+        solve(L, 1, last, d)
+        most = 0.0
+        for i in range(1, last):
+            most = max(most, abs(d[i]))
+        for i in range(1, last):
+            d[i] *= 1e-3 / most
+
+
+@njit(**PART)
+def newton(rod, field, walls, half, reach, u, bent, t, stiff, held, before, work):  # type: ignore[no-untyped-def]
+    """Minimise the augmented energy; return steps taken, stability and largest turn.
+
+    Steps are negative if it did not come to rest. Stability: 1 if the last matrix was
+    positive, 0 if not.
+    """
+    g, H, L, K, px, py, ax, ay, row, d, trial, keep = work
+    last = u.shape[0] - (1 if rod.grip[0] != 0.0 else 0)
+    value = energy(rod, field, walls, half, reach, u, bent, t, stiff, held, before)
+    kicked = False
+    unstable = 0
+    for step in range(STEPS):
+        own_gradient(rod, field, u, bent, px, py, ax, ay, g, H)
+        touch_gradient(rod, u, bent, t, stiff, before, px, py, ax, ay, row, g, H)
+        if rod.grip[0] != 0.0:
+            add_grip(rod, bent, held, stiff, px, py, ax, ay, g, H)
+        own_stiffness(rod, bent, px, py, H, K)
+        shift = way_down(H, K, L, last, d)
+        if shift > 0.0:
+            unstable += 1
+        for i in range(1, last):
+            d[i] = -g[i]
+        solve(L, 1, last, d)
+        size = 0.0
+        fall = 0.0
+        for i in range(1, last):
+            size = max(size, abs(d[i]))
+            fall -= g[i] * d[i]
+        if not size < 1e9:
+            return -step - 1, 0, unstable
+        if size < SMALL:
+            if shift == 0.0:
+                return step + 1, 1, unstable
+            if kicked and step > 40:
+                return step + 1, 0, unstable
+            softest(L, K, last, d)
+            kicked = True
+            for i in range(1, last):
+                u[i] += d[i]
+            value = energy(
+                rod, field, walls, half, reach, u, bent, t, stiff, held, before
+            )
+            continue
+        share = min(1.0, LONGEST / size)
+        keep[: t.count[0]] = t.s[: t.count[0]]
+        done = False
+        for _ in range(30):
+            for i in range(u.shape[0]):
+                trial[i] = u[i]
+            for i in range(1, last):
+                trial[i] += share * d[i]
+            new = energy(
+                rod, field, walls, half, reach, trial, bent, t, stiff, held, before
+            )
+            noise = 1e-13 * (1.0 + abs(value))
+            if new <= value - 1e-4 * share * fall + noise:
+                done = True
+                break
+            t.s[: t.count[0]] = keep[: t.count[0]]
+            share *= 0.5
+        if not done:
+            value = energy(
+                rod, field, walls, half, reach, u, bent, t, stiff, held, before
+            )
+            return (step + 1 if size < 1e-7 else -step - 1), int(shift == 0.0), unstable
+        for i in range(1, last):
+            u[i] = trial[i]
+        value = new
+        if share == 1.0 and shift == 0.0 and size < 1e-7:
+            return step + 1, 1, unstable
+    return -STEPS, 0, unstable
+
+
+@njit(**PART)
+def update_forces(rod, bent, t, stiff, held):  # type: ignore[no-untyped-def]
+    """Take the walls' forces over; return the largest gap or overlap left in use."""
+    worst = 0.0
+    for k in range(t.count[0]):
+        force = max(0.0, t.force[k] - stiff * t.gap[k])
+        worst = max(worst, abs(force - t.force[k]) / stiff)
+        t.force[k] = force
+    if rod.grip[0] != 0.0:
+        dx = bent.x[-1] - rod.grip[1]
+        dy = bent.y[-1] - rod.grip[2]
+        worst = max(worst, abs(dx), abs(dy))
+        held[0] -= stiff * dx
+        held[1] -= stiff * dy
+    return worst
+
+
+@njit(**PART)
+def lonely(t, piece, s, apart, but):  # type: ignore[no-untyped-def]
+    """Return whether no contact but `but` is on the same piece within `apart`."""
+    for k in range(t.count[0]):
+        if k != but and t.piece[k] == piece and abs(t.s[k] - s) < apart:
+            return False
+    return True
+
+
+@njit(**PART)
+def prune(t, keep):  # type: ignore[no-untyped-def]
+    """Drop contacts without force and clear of the wall; return how many."""
+    n = 0
+    for k in range(t.count[0]):
+        if t.force[k] == 0.0 and t.gap[k] > keep:
+            continue
+        t.piece[n] = t.piece[k]
+        t.kind[n] = t.kind[k]
+        t.s[n] = t.s[k]
+        t.force[n] = t.force[k]
+        t.grip[n] = t.grip[k]
+        t.gap[n] = t.gap[k]
+        n += 1
+    dropped = t.count[0] - n
+    t.count[0] = n
+    return dropped
+
+
+@njit(**PART)
+def look(rod, u, bent, walls, half, h, t, tight):  # type: ignore[no-untyped-def]
+    """Find where the rod is behind a wall; add contacts there, or move those near.
+
+    Returns
+    -------
+    tuple of int and float
+        Contacts added or moved, and the deepest overlap seen.
+    """
+    n = rod.stiff.shape[0]
+    length = rod.s[-1]
+    changed = 0
+    deepest = 0.0
+    gaps = np.empty(4 * n + 1)
+    for piece in range(walls.first.shape[0] - 1):
+        for i in range(4 * n + 1):
+            e = min(i // 4, n - 1)
+            at = station(
+                rod, u, bent,
+                length if i == 4 * n
+                else rod.s[e] + 0.25 * (i % 4) * (rod.s[e + 1] - rod.s[e]),
+            )  # fmt: skip
+            gaps[i] = clearance(walls, piece, at.x, at.y).distance - half
+        for i in range(4 * n + 1):
+            if gaps[i] > h:
+                continue
+            if i > 0 and gaps[i - 1] < gaps[i]:
+                continue
+            if i < 4 * n and gaps[i + 1] <= gaps[i]:
+                continue
+            e = min(i // 4, n - 1)
+            s = length
+            if i < 4 * n:
+                s = rod.s[e] + 0.25 * (i % 4) * (rod.s[e + 1] - rod.s[e])
+                s = nearest(rod, u, bent, walls, piece, s, 0.3 * h)
+            at = station(rod, u, bent, s)
+            gap = clearance(walls, piece, at.x, at.y).distance - half
+            if s < 1e-9 or gap > -tight:
+                continue
+            deepest = max(deepest, -gap)
+            changed += seat(t, piece, s, h, length)
+    return changed, deepest
+
+
+@njit(**PART)
+def seat(t, piece, s, h, length):  # type: ignore[no-untyped-def]
+    """Put a contact at `s` unless one is near; return 1 if anything changed."""
+    is_tip = s > length - 1e-9
+    best = -1
+    for k in range(t.count[0]):
+        if t.piece[k] == piece and (t.kind[k] == TIP) == is_tip:
+            if best < 0 or abs(t.s[k] - s) < abs(t.s[best] - s):
+                best = k
+    if best >= 0 and abs(t.s[best] - s) < 0.6 * h:
+        if is_tip or abs(t.s[best] - s) < 1e-3 * h:
+            return 0
+        t.s[best] = s
+        return 1
+    if t.count[0] == MOST:
+        return 0
+    k = t.count[0]
+    t.count[0] += 1
+    t.piece[k] = piece
+    t.s[k] = s
+    t.force[k] = 0.0
+    t.grip[k] = 0.0
+    t.kind[k] = TIP if is_tip else FLOATS
+    return 1
+
+
+@njit(**PART)
+def sort_kinds(t, h):  # type: ignore[no-untyped-def]
+    """Let isolated contacts float, and the others stay."""
+    for k in range(t.count[0]):
+        if t.kind[k] != TIP:
+            alone = lonely(t, t.piece[k], t.s[k], 1.6 * h, k)
+            t.kind[k] = FLOATS if alone else FIXED
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def settle(rod, field, walls, half, mu, u, t, held, before, soft):  # type: ignore[no-untyped-def]
+    """Bring the rod to rest from the state `u` and the contacts `t`, both updated.
+
+    Parameters
+    ----------
+    rod, field, walls : Rod, ndarray, Walls
+        What rests, in what field (see `planar.march`), in what lumen.
+    half : float
+        Half the rod's side.
+    mu : float
+        Coefficient of friction.
+    u : ndarray, shape (3 n + 1,)
+        Unknowns of the angle (see `rod`).
+    t : Touches
+        Contacts with their forces.
+    held : ndarray, shape (2,)
+        Force that holds a held tip.
+    before : Before
+        The step before, for friction.
+    soft : float
+        Stiffness of the walls to begin with.
+
+    Returns
+    -------
+    tuple
+        Outcome, stability, Newton steps, steps in which the state was no minimum,
+        deepest overlap left, energy without walls.
+    """
+    n = rod.stiff.shape[0]
+    size = 3 * n + 1
+    bent = Bent(
+        np.empty((n, 5)), np.empty((n, 5)), np.empty(n + 1), np.empty(n + 1),
+        np.empty((n, 4)), np.empty((n, 4)),
+    )  # fmt: skip
+    work = (
+        np.empty(size), np.empty((size, size)), np.empty((size, size)), np.empty(size),
+        np.empty(n), np.empty(n), np.empty(size), np.empty(size), np.empty(size),
+        np.empty(size), np.empty(size), np.empty(MOST),
+    )  # fmt: skip
+    h = (rod.s[-1] - rod.s[0]) / n
+    stiff = soft
+    total = 0
+    unstable = 0
+    stable = 0
+    deepest = 0.0
+    bend(rod, u, bent)
+    look(rod, u, bent, walls, half, h, t, GAP)
+    outcome = RESTLESS
+    for k in range(ROUNDS):
+        sort_kinds(t, h)
+        steps, stable, off = newton(
+            rod, field, walls, half, h, u, bent, t, stiff, held, before, work
+        )
+        total += abs(steps)
+        unstable += off
+        if field[0] != 0.0 and inside(field[1:], bent.x[-1], bent.y[-1], 0.0, 0.0):
+            outcome = PULLED
+            break
+        rubbed = rub(t, mu, stiff)
+        worst = max(update_forces(rod, bent, t, stiff, held), rubbed)
+        changed = 0
+        if worst < 1e-3:
+            changed, deepest = look(rod, u, bent, walls, half, h, t, GAP)
+            if k > 12:
+                changed = 0
+            prune(t, GAP)
+        if steps > 0 and worst < GAP and changed == 0:
+            outcome = SETTLED
+            break
+        if k > 8 and worst > 1e-4:
+            outcome = JAMMED
+        stiff = min(HARD, 10.0 * stiff)
+    return outcome, stable, total, unstable, deepest, own_energy(rod, field, u, bent)
+
+
+@njit(**PART)
+def rub(t, mu, stiff):  # type: ignore[no-untyped-def]
+    """Take over the friction that the forces allow; return its change, as a gap."""
+    worst = 0.0
+    if mu == 0.0:
+        return worst
+    for k in range(t.count[0]):
+        grip = mu * max(0.0, t.force[k] - stiff * t.gap[k])
+        worst = max(worst, abs(grip - t.grip[k]) * 1e-3 / (1.0 + grip) * 1e-3)
+        t.grip[k] = grip
+    return worst

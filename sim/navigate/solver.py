@@ -1,0 +1,164 @@
+"""`navigate`: a rod pushed through a lumen, forth and back."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from ...core.checks import finite, listed, shown, size, whole, within
+from ...core.errors import InputError, SolverError
+from ...core.specimen import Specimen
+from ..fields import MagnetField, Support, check_case
+from .case import Case, FieldOfWay
+from .lumen import Lumen
+from .mesh import ELEMENTS, sections_of
+from .passage import Passage
+from .walk import Walk
+
+NO_SUPPORT = Support()
+DEEP = 3.0
+"""Sides of the rod behind a wall beyond which a point has come round the wall's end."""
+
+
+def navigate(
+    specimen: Specimen,
+    lumen: Lumen,
+    field: FieldOfWay,
+    *,
+    way_mm: float | Sequence[float] | None = None,
+    step_mm: float = 0.5,
+    friction: float = 0.0,
+    support: Support = NO_SUPPORT,
+    push_limit_N: float = math.inf,
+    elements: int = ELEMENTS,
+    tip: tuple[float, float, float] | None = None,
+    refine: bool = True,
+) -> Passage:
+    """Push a rod through a lumen.
+
+    Parameters
+    ----------
+    specimen : Specimen
+        The rod; the largest of its sides is its thickness everywhere.
+    lumen : Lumen
+        Walls, entry, and whether the rod is fed or pushed. Its frame is the specimen's:
+        a magnet's gap counts from the point (length of the rod, 0).
+    field : UniformField, MagnetField or callable
+        What bends the rod; or a function of the insertion in mm that returns it.
+    way_mm : float or sequence of float, optional
+        Insertions to go to, one after the other, in mm: (30, 5) is forth and back. The
+        whole rod, if not given.
+    step_mm : float
+        Step of the insertion, in mm; where the rod snaps it is refined by itself.
+    friction : float
+        Coefficient of Coulomb friction along the wall; it acts on the rod's axis.
+    support : Support
+        Weight within the plane, and a factor on the magnetic load.
+    push_limit_N : float
+        Push force at which one gives up, in N.
+    elements : int
+        Elements of the whole rod.
+    tip : tuple of float, optional
+        x and y in mm and angle in degrees of a tip that is held: a rod clamped at both
+        ends, fed in from one.
+    refine : bool
+        Whether to solve the last step again on elements of half the size, for the
+        error.
+
+    Returns
+    -------
+    Passage
+        Every step, what happened on the way, and how it ended.
+
+    Raises
+    ------
+    InputError
+        If a value cannot be, the lumen is narrower than the rod, or the entry is not
+        within it.
+    SolverError
+        If not even the first step has an equilibrium that could be found.
+
+    Examples
+    --------
+    >>> from magbend.sim import UniformField, gmc
+    >>> from magbend.sim.navigate import channel, navigate
+    >>> bend = channel("bend", width_mm=3.0, legs=[(10.0, 0.0), (20.0, 45.0)])
+    >>> passage = navigate(gmc(2), bend, UniformField(flux_mT=0.0))
+    >>> passage.outcome
+    'inserted'
+    """
+    check_case(specimen, field(0.0) if callable(field) else field, support)
+    _check_plane(field, support)
+    if not isinstance(lumen, Lumen):
+        raise InputError(
+            f"lumen must be a Lumen, as channel(...) is; instead received "
+            f"{shown(lumen)}"
+        )
+    lumen.check_rod(max(specimen.sides_mm))
+    case = Case(
+        specimen=specimen,
+        lumen=lumen,
+        field=field,
+        sections=sections_of(specimen, support),
+        walls=lumen.packed(specimen.length_mm, DEEP * max(specimen.sides_mm)),
+        pieces=lumen.pieces,
+        friction=within(friction, 0.0, 2.0, "friction", ""),
+        elements=whole(elements, 2, 400, "elements"),
+        tip=tip,
+    )
+    walk = Walk(case, size(step_mm, "step_mm", "mm"), _limit(push_limit_N))
+    for target_mm in _way(way_mm, case):
+        if not walk.go_to(target_mm):
+            break
+    if not walk.steps:
+        raise SolverError(
+            f"the first {step_mm:g} mm of {specimen.name!r} in lumen {lumen.name!r} "
+            f"have no equilibrium ({walk.outcome}); try another entry or a weaker field"
+        )
+    return Passage(
+        lumen=lumen.name,
+        specimen=specimen.name,
+        outcome=walk.outcome,
+        steps=tuple(walk.steps),
+        events=tuple(walk.events),
+        error_mm=walk.error_mm() if refine else math.nan,
+    )
+
+
+def _way(way_mm: object, case: Case) -> tuple[float, ...]:
+    """Return the insertions to go to."""
+    longest_mm = case.length_mm
+    given = (longest_mm,) if way_mm is None else listed(way_mm) or (way_mm,)
+    least = 1e-3 * longest_mm
+    way = tuple(within(w, least, longest_mm, "way_mm", "mm") for w in given)  # type: ignore[arg-type]
+    if case.feeds:
+        return way
+    # A pushed rod begins with its tip at the entry.
+    return way
+
+
+def _limit(push_limit_N: float) -> float:
+    if push_limit_N == math.inf:
+        return push_limit_N
+    return size(finite(push_limit_N, "push_limit_N", "N"), "push_limit_N", "N")
+
+
+def _check_plane(field: FieldOfWay, support: Support) -> None:
+    """Refuse what would lift the rod out of the plane of the lumen."""
+    first = field(0.0) if callable(field) else field
+    if isinstance(first, MagnetField) and not first.in_plane:
+        raise InputError(
+            "a magnet beside a planar lumen must be symmetric about its plane "
+            "(elevation_deg 0, offset_mm z 0); instead received elevation_deg "
+            f"{first.magnet.elevation_deg:g}, offset z {first.magnet.offset_mm[2]:g} mm"
+        )
+    if not support.in_plane:
+        raise InputError(
+            "gravity_m_s2 must be within the plane of the lumen, z 0; instead received "
+            f"{support.gravity_m_s2[2]:g} m/s2: a floor would carry it"
+        )
+    if support.clamp_angle_deg != 0.0:
+        raise InputError(
+            "clamp_angle_deg must be 0 in a lumen, whose entry_angle_deg tells the "
+            f"direction; instead received {support.clamp_angle_deg:g} deg"
+        )

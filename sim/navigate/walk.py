@@ -1,0 +1,274 @@
+"""One step after the other, finer where the rod snaps."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .case import Case
+from .lumen import Gate
+from .mesh import thirds, trace, unknowns
+from .passage import INSERTED, JAMMED, LIMIT, LOST, PULLED_ON, Event, Step
+from .readout import loads, push_force, read_step
+from .rod import Rod
+from .settle import JAMMED as NO_ROOM
+from .settle import PULLED, SETTLED, SOFT, settle
+from .touch import TIP, Before, Touches, no_touches
+
+Array = NDArray[np.float64]
+
+FINEST = 64
+"""A step is halved down to this part of it before a jump counts as a snap."""
+JUMP = 6.0
+"""A move beyond this many steps is looked at closely."""
+EASE = 1e-3
+"""Friction is fully mobilised by a slip of this part of a step."""
+SOFTEST = 1e2
+"""Stiffness of the walls where a rod that snaps is to find its way past them."""
+WHY = {NO_ROOM: JAMMED, PULLED: PULLED_ON}
+
+
+@dataclass(slots=True)
+class State:
+    """The rod at rest: insertion, mesh, unknowns, contacts."""
+
+    insertion_mm: float
+    rod: Rod
+    u: Array
+    touches: Touches
+    held: Array = field(default_factory=lambda: np.zeros(2))
+    energy: float = 0.0
+    overlap: float = 0.0
+    rubbing: Array = field(default_factory=lambda: np.zeros(0))
+    moved: float = 0.0
+
+
+def at_rest(
+    case: Case, old: State | None, insertion_mm: float, soft: float
+) -> tuple[int, State]:
+    """Return the outcome of `settle` at an insertion, and the state, from an old one.
+
+    The first guess follows the leader: the rod keeps its place in the lumen.
+    """
+    rod = case.rod(insertion_mm)
+    if old is None:
+        old = State(insertion_mm, rod, np.full(3, rod.root[2]), no_touches())
+        u = np.zeros(3 * len(rod.stiff) + 1)
+        u[::3] = rod.root[2]
+        if rod.grip[0]:
+            u[-1] = rod.grip[3]
+        guess, touches, shift = None, old.touches, 0.0
+        before = Before(np.zeros(2), np.zeros(2), np.zeros(2), 0.0, 1.0)
+    else:
+        shift = (insertion_mm - old.insertion_mm) / case.length_mm
+        u, touches = follow(case, old, rod, shift)
+        before = history(case, old, shift)
+    guess = trace(rod, u, rod.s)
+    held = old.held.copy()
+    outcome, stable, _, _, overlap, energy = settle(
+        rod, case.flux(insertion_mm), case.walls, case.half, case.friction,
+        u, touches, held, before, soft,
+    )  # fmt: skip
+    moved = np.hypot(*(trace(rod, u, rod.s)[:2] - guess[:2])).max()
+    if outcome == SETTLED and not stable:
+        outcome = -1
+    return outcome, State(
+        insertion_mm=insertion_mm,
+        rod=rod,
+        u=u,
+        touches=touches,
+        held=held,
+        energy=energy,
+        overlap=overlap,
+        rubbing=rubbing(touches, before),
+        moved=float(moved),
+    )
+
+
+def follow(case: Case, old: State, rod: Rod, shift: float) -> tuple[Array, Touches]:
+    """Return unknowns and contacts of the old state on the new mesh."""
+    ahead = 0.0 if case.feeds else shift
+    s = thirds(rod)
+    u = unknowns(rod, trace(old.rod, old.u, (s + ahead).ravel())[2].reshape(s.shape))
+    if rod.grip[0]:
+        u[-1] = rod.grip[3]
+    touches = Touches(*(array.copy() for array in old.touches))
+    n = touches.count[0]
+    s_new = touches.s[:n] - ahead
+    s_new[touches.kind[:n] == TIP] = rod.s[-1]
+    kept = np.flatnonzero((s_new > 0.0) & (s_new <= rod.s[-1]))
+    touches.s[:n] = s_new
+    for array in touches[1:]:
+        array[: len(kept)] = array[kept]
+    touches.count[0] = len(kept)
+    return u, touches
+
+
+def history(case: Case, old: State, shift: float) -> Before:
+    """Return where the material points were, for friction."""
+    end = old.rod.s[-1]
+    s = np.linspace(min(0.0, -1.01 * shift), end, 241)
+    x, y = trace(old.rod, old.u, s)[:2]
+    ease = max(EASE * abs(shift), 1e-9)
+    return Before(s, x, y, shift if case.feeds else 0.0, ease)
+
+
+def rubbing(touches: Touches, before: Before) -> Array:
+    """Return friction along the walls' tangents, against the rod's slip."""
+    n = touches.count[0]
+    s = touches.s[:n] - before.shift
+    dx = touches.x[:n] - np.interp(s, before.s, before.x)
+    dy = touches.y[:n] - np.interp(s, before.s, before.y)
+    slip = touches.ny[:n] * dx - touches.nx[:n] * dy
+    return np.asarray(touches.grip[:n] * np.clip(slip / before.ease, -1.0, 1.0))
+
+
+class Walk:
+    """A rod on its way: its state, and what happened."""
+
+    def __init__(self, case: Case, step_mm: float, limit_N: float) -> None:
+        self.case = case
+        self.step_mm = step_mm
+        self.limit_N = limit_N
+        self.state: State | None = None
+        self.steps: list[Step] = []
+        self.events: list[Event] = []
+        self.outcome = INSERTED
+
+    def go_to(self, target_mm: float) -> bool:
+        """Go to an insertion; return whether it was reached."""
+        if self.state is None and not self._begin(target_mm):
+            return False
+        now = self._here()
+        way = math.copysign(1.0, target_mm - now.insertion_mm)
+        step = self.step_mm
+        while now.insertion_mm != target_mm:
+            left = abs(target_mm - now.insertion_mm)
+            take = left if left < 1.001 * step else step
+            goal = target_mm if take == left else now.insertion_mm + way * take
+            finest = step <= self.step_mm / FINEST
+            new = self._try(now, goal, last_try=finest)
+            if new is None and finest:
+                return False
+            if new is None:
+                step *= 0.5
+                continue
+            self._arrive(now, new)
+            if abs(self.steps[-1].push_N) > self.limit_N:
+                self.outcome = LIMIT
+                return False
+            now = new
+            step = min(2.0 * step, self.step_mm)
+        return True
+
+    def _here(self) -> State:
+        if self.state is None:
+            raise RuntimeError("the walk has not begun")
+        return self.state
+
+    def _begin(self, target_mm: float) -> bool:
+        """Take the first step into the lumen."""
+        first = min(self.step_mm, target_mm)
+        if self.case.tip is not None:
+            first = target_mm
+        outcome, state = at_rest(self.case, None, first, SOFT)
+        if outcome != SETTLED:
+            self.outcome = WHY.get(outcome, LOST)
+            return False
+        self._arrive(None, state)
+        return True
+
+    def _try(self, old: State, goal_mm: float, *, last_try: bool) -> State | None:
+        """Return the state at a goal; None if a finer step is needed, or none is."""
+        outcome, new = at_rest(self.case, old, goal_mm, SOFT)
+        calm = new.moved * self.case.length_mm <= JUMP * abs(goal_mm - old.insertion_mm)
+        if outcome == SETTLED and (calm or last_try):
+            return new
+        if not last_try:
+            return None
+        outcome, new = at_rest(self.case, old, goal_mm, SOFTEST)
+        if outcome == SETTLED:
+            return new
+        self.outcome = WHY.get(outcome, LOST)
+        return None
+
+    def _arrive(self, old: State | None, new: State) -> None:
+        case = self.case
+        self.state = new
+        field = case.flux(new.insertion_mm)
+        load = loads(new.rod, field, new.u, new.touches, new.rubbing, new.held)
+        step = read_step(
+            new.insertion_mm,
+            new.rod,
+            new.u,
+            new.touches,
+            case.pieces,
+            push=push_force(new.rod, field, new.u, load, slides=case.feeds),
+            energy=new.energy,
+            overlap=new.overlap,
+            friction=case.friction,
+            length_mm=case.length_mm,
+            unit_N=case.unit_N,
+        )
+        self._notice(old, new, step)
+        self.steps.append(step)
+
+    def _notice(self, old: State | None, new: State, step: Step) -> None:
+        """Write down what happened in a step."""
+        at_mm = new.insertion_mm
+        if step.contacts and not any(event.kind == "touch" for event in self.events):
+            self.events.append(
+                Event(kind="touch", insertion_mm=at_mm, what=step.contacts[0].wall)
+            )
+        if old is None:
+            return
+        moved_mm = new.moved * self.case.length_mm
+        taken_mm = abs(at_mm - old.insertion_mm)
+        if moved_mm > JUMP * taken_mm and taken_mm < 1.5 * self.step_mm / FINEST:
+            lost = (old.energy - new.energy) * self.case.unit_N * self.case.length_mm
+            self.events.append(
+                Event(
+                    kind="snap",
+                    insertion_mm=at_mm,
+                    what="the rod leaves a state that ceased to be stable",
+                    released_Nmm=lost,
+                    moved_mm=moved_mm,
+                )
+            )
+        before = self.steps[-1].tip_mm
+        for gate in self.case.lumen.gates:
+            if crosses(gate, before, step.tip_mm):
+                self.events.append(
+                    Event(kind="gate", insertion_mm=at_mm, what=gate.name)
+                )
+
+    def error_mm(self) -> float:
+        """Return how far the last shape is from the one on elements of half the size."""
+        state = self._here()
+        fine = replace(self.case, elements=2 * self.case.elements, friction=0.0)
+        if self.case.friction:
+            return math.nan
+        outcome, new = at_rest(fine, state, state.insertion_mm, SOFT)
+        if outcome != SETTLED:
+            return math.nan
+        s = state.rod.s
+        off = trace(new.rod, new.u, s)[:2] - trace(state.rod, state.u, s)[:2]
+        return float(np.hypot(*off).max()) * self.case.length_mm
+
+
+def crosses(
+    gate: Gate, start_mm: tuple[float, float], end_mm: tuple[float, float]
+) -> bool:
+    """Return whether the way from one point to another passes a gate."""
+    (ax, ay), (bx, by) = gate.from_mm, gate.to_mm
+
+    def side(p: tuple[float, float]) -> float:
+        return (bx - ax) * (p[1] - ay) - (by - ay) * (p[0] - ax)
+
+    (px, py), (qx, qy) = start_mm, end_mm
+    u = (qx - px) * (ay - py) - (qy - py) * (ax - px)
+    v = (qx - px) * (by - py) - (qy - py) * (bx - px)
+    return (side(start_mm) > 0.0) != (side(end_mm) > 0.0) and (u > 0.0) != (v > 0.0)
