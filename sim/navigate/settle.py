@@ -21,6 +21,8 @@ from .touch import (
     FLOATS,
     MOST,
     TIP,
+    curvature,
+    slope,
     locate,
     nearest,
     touch_energy,
@@ -30,11 +32,15 @@ from .walls import clearance
 
 SETTLED, RESTLESS, JAMMED, PULLED = range(4)
 """Outcomes: at rest; no convergence; no room left; pulled onto a magnet."""
-SOFT, HARD = 1e4, 1e6
+SOFT, HARD = 1e6, 1e6
 """Stiffness of the walls at first and at last: it decides how fast the gaps close, not
 how far."""
 GAP = 3e-10
 """Gaps closed to this count as closed, in lengths of the rod."""
+OVERLAP = 1e-7
+"""A place deeper than this behind a wall becomes a contact."""
+APART = 0.25
+"""Least distance of contacts on one piece, in elements."""
 STEPS = 60
 """Newton's steps for one set of contacts."""
 ROUNDS = 30
@@ -78,10 +84,10 @@ def solve(L, first, last, b):  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
-def energy(rod, field, walls, half, reach, u, bent, t, stiff, held, before):  # type: ignore[no-untyped-def]
+def energy(rod, field, walls, half, u, bent, t, stiff, held, before):  # type: ignore[no-untyped-def]
     """Bend the rod, bring the contacts up to date, return the augmented energy."""
     bend(rod, u, bent)
-    locate(rod, u, bent, walls, half, reach, t)
+    locate(rod, u, bent, walls, half, t)
     total = own_energy(rod, field, u, bent) + touch_energy(t, stiff, before)
     if rod.grip[0] != 0.0:
         fx = held[0] - stiff * (bent.x[-1] - rod.grip[1])
@@ -139,7 +145,7 @@ def softest(L, K, last, d):  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
-def newton(rod, field, walls, half, reach, u, bent, t, stiff, held, before, work):  # type: ignore[no-untyped-def]
+def newton(rod, field, walls, half, u, bent, t, stiff, held, before, work):  # type: ignore[no-untyped-def]
     """Minimise the augmented energy; return steps taken, stability and largest turn.
 
     Steps are negative if it did not come to rest. Stability: 1 if the last matrix was
@@ -147,7 +153,7 @@ def newton(rod, field, walls, half, reach, u, bent, t, stiff, held, before, work
     """
     g, H, L, K, px, py, ax, ay, row, d, trial, keep = work
     last = u.shape[0] - (1 if rod.grip[0] != 0.0 else 0)
-    value = energy(rod, field, walls, half, reach, u, bent, t, stiff, held, before)
+    value = energy(rod, field, walls, half, u, bent, t, stiff, held, before)
     kicked = False
     unstable = 0
     for step in range(STEPS):
@@ -179,7 +185,7 @@ def newton(rod, field, walls, half, reach, u, bent, t, stiff, held, before, work
             for i in range(1, last):
                 u[i] += d[i]
             value = energy(
-                rod, field, walls, half, reach, u, bent, t, stiff, held, before
+                rod, field, walls, half, u, bent, t, stiff, held, before
             )
             continue
         share = min(1.0, LONGEST / size)
@@ -191,7 +197,7 @@ def newton(rod, field, walls, half, reach, u, bent, t, stiff, held, before, work
             for i in range(1, last):
                 trial[i] += share * d[i]
             new = energy(
-                rod, field, walls, half, reach, trial, bent, t, stiff, held, before
+                rod, field, walls, half, trial, bent, t, stiff, held, before
             )
             noise = 1e-13 * (1.0 + abs(value))
             if new <= value - 1e-4 * share * fall + noise:
@@ -201,7 +207,7 @@ def newton(rod, field, walls, half, reach, u, bent, t, stiff, held, before, work
             share *= 0.5
         if not done:
             value = energy(
-                rod, field, walls, half, reach, u, bent, t, stiff, held, before
+                rod, field, walls, half, u, bent, t, stiff, held, before
             )
             return (step + 1 if size < 1e-7 else -step - 1), int(shift == 0.0), unstable
         for i in range(1, last):
@@ -251,6 +257,8 @@ def prune(t, keep):  # type: ignore[no-untyped-def]
         t.force[n] = t.force[k]
         t.grip[n] = t.grip[k]
         t.gap[n] = t.gap[k]
+        t.home[n] = t.home[k]
+        t.room[n] = t.room[k]
         n += 1
     dropped = t.count[0] - n
     t.count[0] = n
@@ -291,14 +299,45 @@ def look(rod, u, bent, walls, half, h, t, tight):  # type: ignore[no-untyped-def
             s = length
             if i < 4 * n:
                 s = rod.s[e] + 0.25 * (i % 4) * (rod.s[e + 1] - rod.s[e])
-                s = nearest(rod, u, bent, walls, piece, s, 0.3 * h)
+                s = nearest(rod, u, bent, walls, piece, s, s, 0.3 * h)
             at = station(rod, u, bent, s)
             gap = clearance(walls, piece, at.x, at.y).distance - half
             if s < 1e-9 or gap > -tight:
                 continue
             deepest = max(deepest, -gap)
-            changed += seat(t, piece, s, h, length)
+            second = slope(clearance(walls, piece, at.x, at.y), at)[1]
+            if second > 2.0 * flat_below(h) and join(t, piece, s, h) == 1:
+                changed += 1
+            else:
+                changed += seat(t, piece, s, h, length)
     return changed, deepest
+
+
+@njit(**PART)
+def flat_below(h):  # type: ignore[no-untyped-def]
+    """Return the curvature of the gap below which one contact becomes two."""
+    return 4.0 * OVERLAP / (APART * h) ** 2
+
+
+@njit(**PART)
+def join(t, piece, s, h):  # type: ignore[no-untyped-def]
+    """Make two contacts near `s` one that floats; return 1 if there were just two."""
+    a = b = -1
+    n = 0
+    for k in range(t.count[0]):
+        if t.piece[k] == piece and t.kind[k] == FIXED and abs(t.s[k] - s) < h:
+            n += 1
+            a, b = b, k
+    if n != 2:
+        return 0
+    t.s[b] = t.home[b] = s
+    t.force[b] += t.force[a]
+    t.grip[b] += t.grip[a]
+    t.kind[b] = FLOATS
+    t.room[b] = 0.5 * APART * h
+    t.force[a] = 0.0
+    t.gap[a] = 1.0
+    return 1
 
 
 @njit(**PART)
@@ -310,11 +349,14 @@ def seat(t, piece, s, h, length):  # type: ignore[no-untyped-def]
         if t.piece[k] == piece and (t.kind[k] == TIP) == is_tip:
             if best < 0 or abs(t.s[k] - s) < abs(t.s[best] - s):
                 best = k
-    if best >= 0 and abs(t.s[best] - s) < 0.6 * h:
-        if is_tip or abs(t.s[best] - s) < 1e-3 * h:
-            return 0
-        t.s[best] = s
-        return 1
+    if best >= 0 and abs(t.s[best] - s) < APART * h:
+        return 0
+    return add_touch(t, piece, s, TIP if is_tip else FLOATS)
+
+
+@njit(**PART)
+def add_touch(t, piece, s, kind):  # type: ignore[no-untyped-def]
+    """Add a contact without force, if there is room for one; return 1 if so."""
     if t.count[0] == MOST:
         return 0
     k = t.count[0]
@@ -323,17 +365,55 @@ def seat(t, piece, s, h, length):  # type: ignore[no-untyped-def]
     t.s[k] = s
     t.force[k] = 0.0
     t.grip[k] = 0.0
-    t.kind[k] = TIP if is_tip else FLOATS
+    t.gap[k] = -1.0
+    t.home[k] = s
+    t.room[k] = 0.0
+    t.kind[k] = kind
     return 1
 
 
 @njit(**PART)
-def sort_kinds(t, h):  # type: ignore[no-untyped-def]
-    """Let isolated contacts float, and the others stay."""
+def sort_kinds(rod, u, bent, walls, half, t, h):  # type: ignore[no-untyped-def]
+    """Let isolated contacts float, the others stay; split one that begins to lie flat.
+
+    Two contacts, `APART` from each other, hold a rod that lies flat between them.
+    """
+    locate(rod, u, bent, walls, half, t)
     for k in range(t.count[0]):
-        if t.kind[k] != TIP:
-            alone = lonely(t, t.piece[k], t.s[k], 1.6 * h, k)
-            t.kind[k] = FLOATS if alone else FIXED
+        if t.kind[k] == TIP:
+            continue
+        alone = lonely(t, t.piece[k], t.s[k], h, k) or t.bend[k] * h > 1.0
+        second = curvature(t, k)
+        half_apart = 0.5 * APART * h
+        s = t.s[k]
+        if not alone:
+            t.kind[k] = FIXED
+        elif (
+            second < flat_below(h)
+            and s > half_apart
+            and s < rod.s[-1] - half_apart
+            and t.force[k] > 0.0
+            and add_touch(t, t.piece[k], s + half_apart, FIXED) == 1
+        ):
+            t.kind[k] = FIXED
+            t.s[k] = s - half_apart
+            t.force[k] *= 0.5
+            t.force[t.count[0] - 1] = t.force[k]
+        else:
+            t.kind[k] = FLOATS
+            t.home[k] = s
+            t.room[k] = (0.5 if second > 1.0 else 0.5 * APART) * h
+
+
+@njit(**PART)
+def strayed(rod, t):  # type: ignore[no-untyped-def]
+    """Return how many floating contacts are as far from home as they may be."""
+    n = 0
+    for k in range(t.count[0]):
+        far = abs(t.s[k] - t.home[k]) > 0.999 * t.room[k]
+        if t.kind[k] == FLOATS and t.force[k] > 0.0 and far:
+            n += 1
+    return n
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -383,12 +463,12 @@ def settle(rod, field, walls, half, mu, u, t, held, before, soft):  # type: igno
     stable = 0
     deepest = 0.0
     bend(rod, u, bent)
-    look(rod, u, bent, walls, half, h, t, GAP)
+    look(rod, u, bent, walls, half, h, t, OVERLAP)
     outcome = RESTLESS
     for k in range(ROUNDS):
-        sort_kinds(t, h)
+        sort_kinds(rod, u, bent, walls, half, t, h)
         steps, stable, off = newton(
-            rod, field, walls, half, h, u, bent, t, stiff, held, before, work
+            rod, field, walls, half, u, bent, t, stiff, held, before, work
         )
         total += abs(steps)
         unstable += off
@@ -399,9 +479,8 @@ def settle(rod, field, walls, half, mu, u, t, held, before, soft):  # type: igno
         worst = max(update_forces(rod, bent, t, stiff, held), rubbed)
         changed = 0
         if worst < 1e-3:
-            changed, deepest = look(rod, u, bent, walls, half, h, t, GAP)
-            if k > 12:
-                changed = 0
+            changed, deepest = look(rod, u, bent, walls, half, h, t, OVERLAP)
+            changed = 0 if k > 12 else changed + strayed(rod, t)
             prune(t, GAP)
         if steps > 0 and worst < GAP and changed == 0:
             outcome = SETTLED

@@ -28,6 +28,8 @@ Ints = NDArray[np.int64]
 
 MOST = 160
 """Contacts of one rod."""
+FLAT = 1e-2
+"""Curvature of the gap, in 1/L, below which the rod is about to lie on the wall."""
 FIXED, FLOATS, TIP = 0, 1, 2
 """Kinds of contact."""
 
@@ -47,6 +49,8 @@ class Touches(NamedTuple):
         Of the wall as seen from there: gap, normal, curvature of its level line.
     x, y, theta, kappa, xi, element : ndarray, shape (160,)
         Of the rod.
+    home, room : ndarray, shape (160,)
+        Where a floating contact was when Newton began, and how far it may move.
     """
 
     count: Ints
@@ -65,6 +69,8 @@ class Touches(NamedTuple):
     theta: Array
     kappa: Array
     xi: Array
+    home: Array
+    room: Array
 
 
 class Before(NamedTuple):
@@ -90,7 +96,7 @@ class Before(NamedTuple):
 def no_touches() -> Touches:
     """Return room for contacts, and none."""
     ints = [np.zeros(1, np.int64), *(np.zeros(MOST, np.int64) for _ in range(3))]
-    return Touches(*ints, *(np.zeros(MOST) for _ in range(12)))
+    return Touches(*ints, *(np.zeros(MOST) for _ in range(14)))
 
 
 @njit(**PART)
@@ -103,10 +109,10 @@ def slope(near, at):  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
-def nearest(rod, u, bent, walls, piece, s, reach):  # type: ignore[no-untyped-def]
-    """Return the arc length near `s` where the rod is nearest to a piece."""
-    low = max(0.0, s - reach)
-    high = min(rod.s[-1], s + reach)
+def nearest(rod, u, bent, walls, piece, s, home, reach):  # type: ignore[no-untyped-def]
+    """Return the arc length within `reach` of `home` where the rod is nearest."""
+    low = max(0.0, home - reach)
+    high = min(rod.s[-1], home + reach)
     for _ in range(12):
         at = station(rod, u, bent, s)
         near = clearance(walls, piece, at.x, at.y)
@@ -126,11 +132,13 @@ def nearest(rod, u, bent, walls, piece, s, reach):  # type: ignore[no-untyped-de
 
 
 @njit(**PART)
-def locate(rod, u, bent, walls, half, reach, t):  # type: ignore[no-untyped-def]
+def locate(rod, u, bent, walls, half, t):  # type: ignore[no-untyped-def]
     """Bring the contacts up to date with the bent rod; floating ones move."""
     for k in range(t.count[0]):
         if t.kind[k] == FLOATS:
-            t.s[k] = nearest(rod, u, bent, walls, t.piece[k], t.s[k], reach)
+            t.s[k] = nearest(
+                rod, u, bent, walls, t.piece[k], t.s[k], t.home[k], t.room[k]
+            )
         elif t.kind[k] == TIP:
             t.s[k] = rod.s[-1]
         at = station(rod, u, bent, t.s[k])
@@ -226,19 +234,25 @@ def touch_gradient(rod, u, bent, t, stiff, before, px, py, ax, ay, work, g, H): 
 
 
 @njit(**PART)
+def curvature(t, k):  # type: ignore[no-untyped-def]
+    """Return the second derivative of a contact's gap along the rod."""
+    along = t.ny[k] * math.cos(t.theta[k]) - t.nx[k] * math.sin(t.theta[k])
+    return along * t.kappa[k] + t.bend[k] * along * along
+
+
+@njit(**PART)
 def slide(rod, t, k, force, n, work, H):  # type: ignore[no-untyped-def]
     """Add to H what a floating contact gains by moving along the rod.
 
-    `work` holds the derivative of its position along the wall's tangent.
+    `work` holds the derivative of its position along the wall's tangent. Where the rod
+    is about to lie flat on the wall it cannot turn there: the curvature has a floor.
     """
     if t.s[k] <= 0.0 or t.s[k] >= rod.s[-1]:
         return
     c = math.cos(t.theta[k])
     s = math.sin(t.theta[k])
     along = t.ny[k] * c - t.nx[k] * s
-    second = along * t.kappa[k] + t.bend[k] * along * along
-    if second <= 1e-9:
-        return
+    second = max(curvature(t, k), FLAT)
     e = t.element[k]
     z = t.xi[k]
     b = z * z - z

@@ -22,8 +22,10 @@ Array = NDArray[np.float64]
 
 FINEST = 64
 """A step is halved down to this part of it before a jump counts as a snap."""
-JUMP = 6.0
+JUMP = 4.0
 """A move beyond this many steps is looked at closely."""
+LOSS = 1e-4
+"""A snap loses more than this part of the energy."""
 EASE = 1e-3
 """Friction is fully mobilised by a slip of this part of a step."""
 SOFTEST = 1e2
@@ -43,7 +45,10 @@ class State:
     energy: float = 0.0
     overlap: float = 0.0
     rubbing: Array = field(default_factory=lambda: np.zeros(0))
+    rubbed: float = 0.0
+    """Work of friction in the step that led here."""
     moved: float = 0.0
+    push: float = 0.0
 
 
 def at_rest(
@@ -75,6 +80,7 @@ def at_rest(
     moved = np.hypot(*(trace(rod, u, rod.s)[:2] - guess[:2])).max()
     if outcome == SETTLED and not stable:
         outcome = -1
+    friction, slip = rubbing(touches, before)
     return outcome, State(
         insertion_mm=insertion_mm,
         rod=rod,
@@ -83,7 +89,8 @@ def at_rest(
         held=held,
         energy=energy,
         overlap=overlap,
-        rubbing=rubbing(touches, before),
+        rubbing=friction,
+        rubbed=float(friction @ slip),
         moved=float(moved),
     )
 
@@ -100,7 +107,7 @@ def follow(case: Case, old: State, rod: Rod, shift: float) -> tuple[Array, Touch
     s_new = touches.s[:n] - ahead
     s_new[touches.kind[:n] == TIP] = rod.s[-1]
     kept = np.flatnonzero((s_new > 0.0) & (s_new <= rod.s[-1]))
-    touches.s[:n] = s_new
+    touches.s[:n] = touches.home[:n] = s_new
     for array in touches[1:]:
         array[: len(kept)] = array[kept]
     touches.count[0] = len(kept)
@@ -116,14 +123,14 @@ def history(case: Case, old: State, shift: float) -> Before:
     return Before(s, x, y, shift if case.feeds else 0.0, ease)
 
 
-def rubbing(touches: Touches, before: Before) -> Array:
-    """Return friction along the walls' tangents, against the rod's slip."""
+def rubbing(touches: Touches, before: Before) -> tuple[Array, Array]:
+    """Return friction along the walls' tangents, and the slip that it is against."""
     n = touches.count[0]
     s = touches.s[:n] - before.shift
     dx = touches.x[:n] - np.interp(s, before.s, before.x)
     dy = touches.y[:n] - np.interp(s, before.s, before.y)
     slip = touches.ny[:n] * dx - touches.nx[:n] * dy
-    return np.asarray(touches.grip[:n] * np.clip(slip / before.ease, -1.0, 1.0))
+    return touches.grip[:n] * np.clip(slip / before.ease, -1.0, 1.0), slip
 
 
 class Walk:
@@ -184,7 +191,7 @@ class Walk:
     def _try(self, old: State, goal_mm: float, *, last_try: bool) -> State | None:
         """Return the state at a goal; None if a finer step is needed, or none is."""
         outcome, new = at_rest(self.case, old, goal_mm, SOFT)
-        calm = new.moved * self.case.length_mm <= JUMP * abs(goal_mm - old.insertion_mm)
+        calm = not self._leaps(old, new)
         if outcome == SETTLED and (calm or last_try):
             return new
         if not last_try:
@@ -195,18 +202,31 @@ class Walk:
         self.outcome = WHY.get(outcome, LOST)
         return None
 
+    def _leaps(self, old: State, new: State) -> bool:
+        """Return whether a step moves the rod far, and loses energy on the way."""
+        taken = (new.insertion_mm - old.insertion_mm) / self.case.length_mm
+        lost = self._released(old, new)
+        scale = abs(new.energy) + abs(old.energy) + abs(old.push * taken)
+        return new.moved > JUMP * abs(taken) and lost > LOSS * scale
+
+    def _released(self, old: State, new: State) -> float:
+        """Return the energy that is neither stored, nor rubbed away, nor work."""
+        taken = (new.insertion_mm - old.insertion_mm) / self.case.length_mm
+        return old.energy + old.push * taken - new.rubbed - new.energy
+
     def _arrive(self, old: State | None, new: State) -> None:
         case = self.case
         self.state = new
         field = case.flux(new.insertion_mm)
         load = loads(new.rod, field, new.u, new.touches, new.rubbing, new.held)
+        new.push = push_force(new.rod, field, new.u, load, slides=case.feeds)
         step = read_step(
             new.insertion_mm,
             new.rod,
             new.u,
             new.touches,
             case.pieces,
-            push=push_force(new.rod, field, new.u, load, slides=case.feeds),
+            push=new.push,
             energy=new.energy,
             overlap=new.overlap,
             friction=case.friction,
@@ -225,17 +245,15 @@ class Walk:
             )
         if old is None:
             return
-        moved_mm = new.moved * self.case.length_mm
-        taken_mm = abs(at_mm - old.insertion_mm)
-        if moved_mm > JUMP * taken_mm and taken_mm < 1.5 * self.step_mm / FINEST:
-            lost = (old.energy - new.energy) * self.case.unit_N * self.case.length_mm
+        if self._leaps(old, new):
+            unit_Nmm = self.case.unit_N * self.case.length_mm
             self.events.append(
                 Event(
                     kind="snap",
                     insertion_mm=at_mm,
                     what="the rod leaves a state that ceased to be stable",
-                    released_Nmm=lost,
-                    moved_mm=moved_mm,
+                    released_Nmm=self._released(old, new) * unit_Nmm,
+                    moved_mm=new.moved * self.case.length_mm,
                 )
             )
         before = self.steps[-1].tip_mm
