@@ -37,14 +37,17 @@ SOFT, HARD = 1e6, 1e6
 how far."""
 GAP = 3e-10
 """Gaps closed to this count as closed, in lengths of the rod."""
-OVERLAP = 1e-7
+OVERLAP = 1e-6
 """A place deeper than this behind a wall becomes a contact."""
 APART = 0.25
 """Least distance of contacts on one piece, in elements."""
 STEPS = 60
 """Newton's steps for one set of contacts."""
-ROUNDS = 30
+ROUNDS = 40
 """Changes of the set of contacts."""
+PATIENCE, FROZEN = 6, 20
+"""Rounds after which contacts stay where they are and none is dropped; and after which
+none is added. So the set cannot cycle."""
 LONGEST = 0.4
 """Most that an angle may change in one step, in rad."""
 SMALL = 1e-11
@@ -266,7 +269,7 @@ def prune(t, keep):  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
-def look(rod, u, bent, walls, half, h, t, tight):  # type: ignore[no-untyped-def]
+def look(rod, u, bent, walls, half, h, t, free):  # type: ignore[no-untyped-def]
     """Find where the rod is behind a wall; add contacts there, or move those near.
 
     Returns
@@ -302,14 +305,14 @@ def look(rod, u, bent, walls, half, h, t, tight):  # type: ignore[no-untyped-def
                 s = nearest(rod, u, bent, walls, piece, s, s, 0.3 * h)
             at = station(rod, u, bent, s)
             gap = clearance(walls, piece, at.x, at.y).distance - half
-            if s < 1e-9 or gap > -tight:
+            if s < 1e-9 or gap > -OVERLAP:
                 continue
             deepest = max(deepest, -gap)
             second = slope(clearance(walls, piece, at.x, at.y), at)[1]
-            if second > 2.0 * flat_below(h) and join(t, piece, s, h) == 1:
+            if free and second > 2.0 * flat_below(h) and join(t, piece, s, h) == 1:
                 changed += 1
             else:
-                changed += seat(t, piece, s, h, length)
+                changed += seat(t, piece, s, h, length, FLOATS if free else FIXED)
     return changed, deepest
 
 
@@ -341,7 +344,7 @@ def join(t, piece, s, h):  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
-def seat(t, piece, s, h, length):  # type: ignore[no-untyped-def]
+def seat(t, piece, s, h, length, kind):  # type: ignore[no-untyped-def]
     """Put a contact at `s` unless one is near; return 1 if anything changed."""
     is_tip = s > length - 1e-9
     best = -1
@@ -351,7 +354,7 @@ def seat(t, piece, s, h, length):  # type: ignore[no-untyped-def]
                 best = k
     if best >= 0 and abs(t.s[best] - s) < APART * h:
         return 0
-    return add_touch(t, piece, s, TIP if is_tip else FLOATS)
+    return add_touch(t, piece, s, TIP if is_tip else kind)
 
 
 @njit(**PART)
@@ -373,7 +376,7 @@ def add_touch(t, piece, s, kind):  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
-def sort_kinds(rod, u, bent, walls, half, t, h):  # type: ignore[no-untyped-def]
+def sort_kinds(rod, u, bent, walls, half, t, h, free):  # type: ignore[no-untyped-def]
     """Let isolated contacts float, the others stay; split one that begins to lie flat.
 
     Two contacts, `APART` from each other, hold a rod that lies flat between them.
@@ -381,6 +384,8 @@ def sort_kinds(rod, u, bent, walls, half, t, h):  # type: ignore[no-untyped-def]
     locate(rod, u, bent, walls, half, t)
     for k in range(t.count[0]):
         if t.kind[k] == TIP:
+            continue
+        if not free and t.kind[k] == FIXED:
             continue
         alone = lonely(t, t.piece[k], t.s[k], h, k) or t.bend[k] * h > 1.0
         second = curvature(t, k)
@@ -463,10 +468,10 @@ def settle(rod, field, walls, half, mu, u, t, held, before, soft):  # type: igno
     stable = 0
     deepest = 0.0
     bend(rod, u, bent)
-    look(rod, u, bent, walls, half, h, t, OVERLAP)
+    look(rod, u, bent, walls, half, h, t, True)
     outcome = RESTLESS
     for k in range(ROUNDS):
-        sort_kinds(rod, u, bent, walls, half, t, h)
+        sort_kinds(rod, u, bent, walls, half, t, h, k < PATIENCE)
         steps, stable, off = newton(
             rod, field, walls, half, u, bent, t, stiff, held, before, work
         )
@@ -479,9 +484,12 @@ def settle(rod, field, walls, half, mu, u, t, held, before, soft):  # type: igno
         worst = max(update_forces(rod, bent, t, stiff, held), rubbed)
         changed = 0
         if worst < 1e-3:
-            changed, deepest = look(rod, u, bent, walls, half, h, t, OVERLAP)
-            changed = 0 if k > 12 else changed + strayed(rod, t)
-            prune(t, GAP)
+            changed, deepest = look(rod, u, bent, walls, half, h, t, k < PATIENCE)
+            if k < PATIENCE:
+                changed += strayed(rod, t)
+                prune(t, GAP)
+            elif k >= FROZEN:
+                changed = 0
         if steps > 0 and worst < GAP and changed == 0:
             outcome = SETTLED
             break
