@@ -102,7 +102,7 @@ def loads(
     n = touches.count[0]
     force = touches.force[:n]
     normal = np.array([touches.nx[:n], touches.ny[:n]])
-    tangent = np.array([touches.ny[:n], -touches.nx[:n]])
+    tangent = np.array([touches.tx[:n], touches.ty[:n]])
     return np.asarray(total + normal @ force - tangent @ rubbing[:n])
 
 

@@ -21,6 +21,7 @@ from .touch import (
     FLOATS,
     MOST,
     TIP,
+    anchor,
     curvature,
     slope,
     locate,
@@ -262,6 +263,13 @@ def prune(t, keep):  # type: ignore[no-untyped-def]
         t.gap[n] = t.gap[k]
         t.home[n] = t.home[k]
         t.room[n] = t.room[k]
+        t.nx[n] = t.nx[k]
+        t.ny[n] = t.ny[k]
+        t.tx[n] = t.tx[k]
+        t.ty[n] = t.ty[k]
+        t.x[n] = t.x[k]
+        t.y[n] = t.y[k]
+        t.way[n] = t.way[k]
         n += 1
     dropped = t.count[0] - n
     t.count[0] = n
@@ -472,6 +480,7 @@ def settle(rod, field, walls, half, mu, u, t, held, before, soft):  # type: igno
     outcome = RESTLESS
     for k in range(ROUNDS):
         sort_kinds(rod, u, bent, walls, half, t, h, k < PATIENCE)
+        anchor(t, before)
         steps, stable, off = newton(
             rod, field, walls, half, u, bent, t, stiff, held, before, work
         )

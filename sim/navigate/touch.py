@@ -50,7 +50,11 @@ class Touches(NamedTuple):
     x, y, theta, kappa, xi, element : ndarray, shape (160,)
         Of the rod.
     home, room : ndarray, shape (160,)
-        Where a floating contact was when Newton began, and how far it may move.
+        Where it was when Newton began, and how far it may float from there.
+    tx, ty, x0, y0 : ndarray, shape (160,)
+        For friction at home: the wall's tangent, and where the rod's point came from.
+    way : ndarray, shape (160,)
+        How far that point slipped along the tangent.
     """
 
     count: Ints
@@ -71,6 +75,11 @@ class Touches(NamedTuple):
     xi: Array
     home: Array
     room: Array
+    tx: Array
+    ty: Array
+    x0: Array
+    y0: Array
+    way: Array
 
 
 class Before(NamedTuple):
@@ -96,7 +105,7 @@ class Before(NamedTuple):
 def no_touches() -> Touches:
     """Return room for contacts, and none."""
     ints = [np.zeros(1, np.int64), *(np.zeros(MOST, np.int64) for _ in range(3))]
-    return Touches(*ints, *(np.zeros(MOST) for _ in range(14)))
+    return Touches(*ints, *(np.zeros(MOST) for _ in range(19)))
 
 
 @njit(**PART)
@@ -153,14 +162,20 @@ def locate(rod, u, bent, walls, half, t):  # type: ignore[no-untyped-def]
         t.nx[k] = near.nx
         t.ny[k] = near.ny
         t.bend[k] = near.bend
+        if t.grip[k] > 0.0:
+            at = station(rod, u, bent, t.home[k])
+            t.way[k] = t.tx[k] * (at.x - t.x0[k]) + t.ty[k] * (at.y - t.y0[k])
 
 
 @njit(**PART)
-def slip(t, k, before):  # type: ignore[no-untyped-def]
-    """Return how far a contact's material point moved along the wall since before."""
-    x = np.interp(t.s[k] - before.shift, before.s, before.x)
-    y = np.interp(t.s[k] - before.shift, before.s, before.y)
-    return t.ny[k] * (t.x[k] - x) - t.nx[k] * (t.y[k] - y)
+def anchor(t, before):  # type: ignore[no-untyped-def]
+    """Let friction act where the contacts are now."""
+    for k in range(t.count[0]):
+        t.home[k] = t.s[k]
+        t.tx[k] = t.ny[k]
+        t.ty[k] = -t.nx[k]
+        t.x0[k] = np.interp(t.s[k] - before.shift, before.s, before.x)
+        t.y0[k] = np.interp(t.s[k] - before.shift, before.s, before.y)
 
 
 @njit(**PART)
@@ -171,7 +186,7 @@ def touch_energy(t, stiff, before):  # type: ignore[no-untyped-def]
         force = max(0.0, t.force[k] - stiff * t.gap[k])
         total += 0.5 * (force * force - t.force[k] * t.force[k]) / stiff
         if t.grip[k] > 0.0:
-            way = abs(slip(t, k, before))
+            way = abs(t.way[k])
             ease = before.ease
             lost = way if way > ease else 0.5 * (way * way / ease + ease)
             total += t.grip[k] * lost
@@ -183,7 +198,7 @@ def drag(t, k, before):  # type: ignore[no-untyped-def]
     """Return friction along the wall's tangent, and how it grows with the slip."""
     if t.grip[k] == 0.0:
         return 0.0, 0.0
-    way = slip(t, k, before)
+    way = t.way[k]
     if abs(way) > before.ease:
         return math.copysign(t.grip[k], way), 0.0
     return t.grip[k] * way / before.ease, t.grip[k] / before.ease
@@ -206,31 +221,40 @@ def touch_gradient(rod, u, bent, t, stiff, before, px, py, ax, ay, work, g, H): 
     """Add the contacts to gradient and Hessian, and their loads to px, py."""
     for k in range(t.count[0]):
         force = max(0.0, t.force[k] - stiff * t.gap[k])
-        if force == 0.0 and t.grip[k] == 0.0:
-            continue
-        e = t.element[k]
-        n = 3 * e + 4
-        rub, growth = drag(t, k, before)
-        tx = t.ny[k]
-        ty = -t.nx[k]
-        fx = force * t.nx[k] - rub * tx
-        fy = force * t.ny[k] - rub * ty
-        rows_at(rod, u, bent, e, t.xi[k], ax, ay)
-        for a in range(n):
-            g[a] -= fx * ax[a] + fy * ay[a]
-        for i in range(e):
-            px[i] += fx
-            py[i] += fy
-        part_stiffness(rod, u, e, t.xi[k], fx, fy, H)
         if force > 0.0:
+            e = t.element[k]
+            n = 3 * e + 4
+            load(rod, u, bent, e, t.xi[k], force * t.nx[k], force * t.ny[k],
+                 px, py, ax, ay, g, H)  # fmt: skip
             for a in range(n):
                 work[a] = t.nx[k] * ax[a] + t.ny[k] * ay[a]
             add_dyad(work, stiff, n, H)
-        for a in range(n):
-            work[a] = tx * ax[a] + ty * ay[a]
-        add_dyad(work, growth - force * t.bend[k], n, H)
-        if t.kind[k] == FLOATS and force > 0.0:
-            slide(rod, t, k, force, n, work, H)
+            for a in range(n):
+                work[a] = t.ny[k] * ax[a] - t.nx[k] * ay[a]
+            add_dyad(work, -force * t.bend[k], n, H)
+            if t.kind[k] == FLOATS:
+                slide(rod, t, k, force, n, work, H)
+        if t.grip[k] > 0.0:
+            rub, growth = drag(t, k, before)
+            at = station(rod, u, bent, t.home[k])
+            load(rod, u, bent, at.element, at.xi, -rub * t.tx[k], -rub * t.ty[k],
+                 px, py, ax, ay, g, H)  # fmt: skip
+            n = 3 * at.element + 4
+            for a in range(n):
+                work[a] = t.tx[k] * ax[a] + t.ty[k] * ay[a]
+            add_dyad(work, growth, n, H)
+
+
+@njit(**PART)
+def load(rod, u, bent, e, xi, fx, fy, px, py, ax, ay, g, H):  # type: ignore[no-untyped-def]
+    """Add a load at xi of element `e`; fill the rows of its place."""
+    rows_at(rod, u, bent, e, xi, ax, ay)
+    for a in range(3 * e + 4):
+        g[a] -= fx * ax[a] + fy * ay[a]
+    for i in range(e):
+        px[i] += fx
+        py[i] += fy
+    part_stiffness(rod, u, e, xi, fx, fy, H)
 
 
 @njit(**PART)

@@ -126,10 +126,7 @@ def history(case: Case, old: State, shift: float) -> Before:
 def rubbing(touches: Touches, before: Before) -> tuple[Array, Array]:
     """Return friction along the walls' tangents, and the slip that it is against."""
     n = touches.count[0]
-    s = touches.s[:n] - before.shift
-    dx = touches.x[:n] - np.interp(s, before.s, before.x)
-    dy = touches.y[:n] - np.interp(s, before.s, before.y)
-    slip = touches.ny[:n] * dx - touches.nx[:n] * dy
+    slip = touches.way[:n]
     return touches.grip[:n] * np.clip(slip / before.ease, -1.0, 1.0), slip
 
 
