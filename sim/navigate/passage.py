@@ -61,6 +61,8 @@ class Step:
         Sum of the walls' normal forces, and the largest, in N.
     energy_Nmm : float
         Of bending, magnet and weight of what is outside the guide, in N mm.
+    rubbed_Nmm : float
+        Work of friction since the beginning, in N mm.
     tip_mm : tuple of float
         Tip, in mm.
     tip_angle_deg : float
@@ -84,6 +86,7 @@ class Step:
     wall_N: float
     most_wall_N: float
     energy_Nmm: float
+    rubbed_Nmm: float
     tip_mm: tuple[float, float]
     tip_angle_deg: float
     contacts: tuple[Contact, ...]

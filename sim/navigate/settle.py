@@ -33,7 +33,7 @@ from .walls import clearance
 
 SETTLED, RESTLESS, JAMMED, PULLED = range(4)
 """Outcomes: at rest; no convergence; no room left; pulled onto a magnet."""
-SOFT, HARD = 1e6, 1e6
+SOFT, HARD = 1e6, 1e8
 """Stiffness of the walls at first and at last: it decides how fast the gaps close, not
 how far."""
 GAP = 3e-10
@@ -42,6 +42,9 @@ OVERLAP = 1e-6
 """A place deeper than this behind a wall becomes a contact."""
 APART = 0.25
 """Least distance of contacts on one piece, in elements."""
+LOOSE = 1e-8
+"""Gaps that are good enough if their contacts are so close that they share their force
+only slowly."""
 STEPS = 60
 """Newton's steps for one set of contacts."""
 ROUNDS = 40
@@ -475,6 +478,7 @@ def settle(rod, field, walls, half, mu, u, t, held, before, soft):  # type: igno
     unstable = 0
     stable = 0
     deepest = 0.0
+    before_this = 1e9
     bend(rod, u, bent)
     look(rod, u, bent, walls, half, h, t, True)
     outcome = RESTLESS
@@ -499,12 +503,14 @@ def settle(rod, field, walls, half, mu, u, t, held, before, soft):  # type: igno
                 prune(t, GAP)
             elif k >= FROZEN:
                 changed = 0
-        if steps > 0 and worst < GAP and changed == 0:
+        if steps > 0 and changed == 0 and worst < (GAP if k < FROZEN else LOOSE):
             outcome = SETTLED
             break
         if k > 8 and worst > 1e-4:
             outcome = JAMMED
-        stiff = min(HARD, 10.0 * stiff)
+        if worst > 0.1 * before_this:
+            stiff = min(HARD, 10.0 * stiff)
+        before_this = worst
     return outcome, stable, total, unstable, deepest, own_energy(rod, field, u, bent)
 
 

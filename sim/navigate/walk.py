@@ -141,6 +141,7 @@ class Walk:
         self.steps: list[Step] = []
         self.events: list[Event] = []
         self.outcome = INSERTED
+        self.rubbed = 0.0
 
     def go_to(self, target_mm: float) -> bool:
         """Go to an insertion; return whether it was reached."""
@@ -214,6 +215,7 @@ class Walk:
     def _arrive(self, old: State | None, new: State) -> None:
         case = self.case
         self.state = new
+        self.rubbed += new.rubbed
         field = case.flux(new.insertion_mm)
         load = loads(new.rod, field, new.u, new.touches, new.rubbing, new.held)
         new.push = push_force(new.rod, field, new.u, load, slides=case.feeds)
@@ -225,6 +227,7 @@ class Walk:
             case.pieces,
             push=new.push,
             energy=new.energy,
+            rubbed=self.rubbed,
             overlap=new.overlap,
             friction=case.friction,
             length_mm=case.length_mm,
