@@ -1,4 +1,5 @@
 from .channels import channel as channel
+from .curves import Arc as Arc
 from .curves import circle as circle
 from .curves import polyline as polyline
 from .curves import spline as spline
