@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from . import sim_equilibria, sim_magnet, sim_sweep
+from . import sim_equilibria, sim_magnet, sim_navigate, sim_sweep
 from .console import group, print_json
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ app = group(
 )
 app.command("equilibria", epilog=sim_equilibria.EXAMPLE)(sim_equilibria.equilibria)
 app.command("magnet", epilog=sim_magnet.EXAMPLE)(sim_magnet.magnet)
+app.command("navigate", epilog=sim_navigate.EXAMPLE)(sim_navigate.navigate)
 app.command("sweep", epilog=sim_sweep.EXAMPLE)(sim_sweep.sweep)
 
 SHAPE_EXAMPLE = (

@@ -3,6 +3,10 @@ from .curves import Arc as Arc
 from .curves import circle as circle
 from .curves import polyline as polyline
 from .curves import spline as spline
+from .figures import draw_passage as draw_passage
+from .figures import film as film
+from .files import read_lumen as read_lumen
+from .files import read_poses as read_poses
 from .lumen import Gate as Gate
 from .lumen import Lumen as Lumen
 from .lumen import Wall as Wall
@@ -10,4 +14,5 @@ from .passage import Contact as Contact
 from .passage import Event as Event
 from .passage import Passage as Passage
 from .passage import Step as Step
+from .poses import moving as moving
 from .solver import navigate as navigate

@@ -28,7 +28,7 @@ class Case:
 
     Parameters
     ----------
-    sections : ndarray, shape (k, 5)
+    sections : ndarray, shape (k, 6)
         See `mesh.sections_of`.
     walls : Walls
         Of the lumen, in lengths of the rod.

@@ -14,7 +14,7 @@ from .lumen import FEED, Gate, Lumen, Wall
 def legs_of(
     start_mm: Point, angle_deg: float, legs: Sequence[tuple[float, float]]
 ) -> tuple[Arc, ...]:
-    """Return the path of legs: length in mm and angle by which it turns left, in deg."""
+    """Return the path of legs: length in mm, and angle of the turn left in deg."""
     x, y, angle = *start_mm, math.radians(angle_deg)
     arcs = []
     for length_mm, turn_deg in legs:
@@ -63,8 +63,9 @@ def channel(
     for arc in path:
         if abs(arc.curvature_per_mm) * half_mm >= 1.0 - 1e-6:
             raise InputError(
-                f"a leg of lumen {name!r} must bend with a radius above half its width, "
-                f"{half_mm:g} mm; instead received {1.0 / abs(arc.curvature_per_mm):g} mm"
+                f"a leg of lumen {name!r} must bend with a radius above half its "
+                f"width, {half_mm:g} mm; instead received "
+                f"{1.0 / abs(arc.curvature_per_mm):g} mm"
             )
     left = Wall("left", tuple(arc.beside(half_mm) for arc in path))
     right = Wall("right", tuple(arc.beside(-half_mm) for arc in path))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -85,7 +86,7 @@ def polyline(points_mm: Sequence[Point], *, closed: bool = False) -> tuple[Arc, 
     ring = [*points_mm, points_mm[0]] if closed else list(points_mm)
     return tuple(
         from_to(a, math.atan2(b[1] - a[1], b[0] - a[0]), b)
-        for a, b in zip(ring, ring[1:], strict=False)
+        for a, b in itertools.pairwise(ring)
     )
 
 
@@ -129,7 +130,7 @@ def spline(points_mm: Sequence[Point], *, closed: bool = False) -> tuple[Arc, ..
 
 
 def _pairs(values: Array) -> zip[tuple[float, float]]:
-    return zip(values[:-1], values[1:], strict=True)
+    return itertools.pairwise(values)
 
 
 def _biarcs(points: Array, velocities: Array) -> tuple[Arc, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -120,8 +121,12 @@ class Lumen:
         """
         size(side_mm, "side_mm", "mm")
         _check_width(self, side_mm)
-        walls = self.packed(1.0, 1e9)
-        room_mm = float(clearances(walls, np.array([self.entry_mm]))[0])
+        chains = [
+            _Piece([(arc, self._side(wall)) for arc in wall.arcs], wall.closed, False)
+            for wall in self.walls
+        ]
+        walls = _pack(chains, 1.0, 1e9)
+        room_mm = float(clearances(walls, np.array([self.entry_mm], dtype=float))[0])
         if room_mm < 0.5 * side_mm * (1.0 - 1e-9):
             x, y = self.entry_mm
             where = "outside the lumen" if room_mm < 0.0 else "too near to a wall"
@@ -171,7 +176,7 @@ def _pieces(wall: Wall, side: float) -> list[_Piece]:
             not wall.closed and a == 0,
             not wall.closed and b == len(arcs),
         )
-        for a, b in zip(cuts, cuts[1:], strict=False)
+        for a, b in itertools.pairwise(cuts)
     ]
 
 
@@ -263,17 +268,16 @@ def _crossing(a: Array, b: Array, *, same: bool) -> Point | None:
     with np.errstate(divide="ignore", invalid="ignore"):
         t = (d[..., 0] * s[..., 1] - d[..., 1] * s[..., 0]) / det
         u = (d[..., 0] * r[..., 1] - d[..., 1] * r[..., 0]) / det
-    inner = 1e-9
-    hit = (t > inner) & (t < 1.0 - inner) & (u > inner) & (u < 1.0 - inner)
+    hit = (t >= 0.0) & (t <= 1.0) & (u >= 0.0) & (u <= 1.0)
     if same:
         i, j = np.indices(hit.shape)
         hit &= abs(i - j) > 1
-    found = np.argwhere(hit)
-    if not len(found):
-        return None
-    i, j = found[0]
-    x, y = a[i] + t[i, j] * (a[i + 1] - a[i])
-    return float(x), float(y)
+    ends = np.concatenate([a[[0, -1]], b[[0, -1]]])
+    for i, j in np.argwhere(hit):
+        x, y = a[i] + t[i, j] * (a[i + 1] - a[i])
+        if np.hypot(*(ends - (x, y)).T).min() > 1e-6:  # walls may meet at their ends
+            return float(x), float(y)
+    return None
 
 
 def _check_width(lumen: Lumen, side_mm: float) -> None:

@@ -19,10 +19,14 @@ ELEMENTS = 24
 
 
 def sections_of(specimen: Specimen, support: Support) -> Array:
-    """Return the sections, root first: length, stiffness, m, weight (x, y)."""
+    """Return the sections, root first, shape (k, 6).
+
+    Length, stiffness, m, weight (x, y), natural curvature.
+    """
     rows = rod_array(specimen, support)[::-1].copy()
     rows[:, 1] = 1.0 / rows[:, 1]
-    return rows
+    natural = np.array(specimen.natural_curvatures_per_mm) * specimen.length_mm
+    return np.column_stack([rows, natural])
 
 
 def mesh(
@@ -32,7 +36,7 @@ def mesh(
 
     Parameters
     ----------
-    sections : ndarray, shape (k, 5)
+    sections : ndarray, shape (k, 6)
         See `sections_of`.
     length : float
         What is inserted, over the rod's length.
@@ -57,11 +61,12 @@ def mesh(
     m = np.ascontiguousarray(table[:, 2])
     pole = np.concatenate([[0.0], m[:-1] - m[1:], m[-1:]])
     beyond = np.zeros((len(nodes), 2))
-    if table[:, 3:].any():
-        weights = table[:, 3:] * np.diff(nodes)[:, None]
+    if table[:, 3:5].any():
+        weights = table[:, 3:5] * np.diff(nodes)[:, None]
         beyond[:-1] = np.cumsum(weights[::-1], axis=0)[::-1]
     stiff = np.ascontiguousarray(table[:, 1])
-    return Rod(nodes, stiff, np.zeros_like(m), m, pole, beyond, root, grip)
+    natural = np.ascontiguousarray(table[:, 5])
+    return Rod(nodes, stiff, natural, m, pole, beyond, root, grip)
 
 
 @njit(cache=True, error_model="numpy")

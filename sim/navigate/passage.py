@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from ...core.centreline import Centreline
 
 INSERTED = "inserted"
-JAMMED = "jammed: no equilibrium without passing a wall"
+JAMMED = "jammed: no equilibrium found without passing a wall"
 PULLED_ON = "pulled onto the magnet: no equilibrium"
 LIMIT = "push force beyond its limit"
 LOST = "no equilibrium found"
+OVERPOWERED = "no equilibrium found: the magnet pulls more than rod and walls hold"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,10 +108,10 @@ class Event:
 
     Parameters
     ----------
-    kind : {"snap", "gate", "touch"}
+    kind : {"snap", "gate", "gate back", "touch"}
         ``snap``: the rod left a state that ceased to be one (buckling, snap-through)
-        for another. ``gate``: the tip passed a gate. ``touch``: the first contact with
-        a wall.
+        for another. ``gate``: the tip passed a gate, or came back through it.
+        ``touch``: the first contact with a wall.
     insertion_mm : float
         When.
     what : str
@@ -155,7 +156,7 @@ class Passage:
 
     @property
     def gates(self) -> tuple[str, ...]:
-        """Names of the gates the tip passed, in order."""
+        """Names of the gates the tip passed on the way in, in order."""
         return tuple(event.what for event in self.events if event.kind == "gate")
 
     @property

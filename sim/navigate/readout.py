@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ...core.jit import njit
 from ...core.units import deg_from_rad
-from ..planar.march import field_at
-from .mesh import trace
+from ..magnet.flux import field_at
+from .mesh import thirds, trace
 from .passage import Contact, Step
 from .rod import Rod
 from .touch import Touches
@@ -45,14 +45,12 @@ def flux_at(field, x, y):  # type: ignore[no-untyped-def]
     return b[0], b[1]
 
 
-def push_force(
-    rod: Rod, field: Array, u: Array, load: Array, *, slides: bool
-) -> float:
+def push_force(rod: Rod, field: Array, u: Array, load: Array, *, slides: bool) -> float:
     """Return the force that holds the rod at its root, along it.
 
-    A rod that slides out of a guide is driven out by EI kappa^2 / 2, the configurational
-    force of a sliding sleeve (Bigoni, Dal Corso, Bosi and Misseroni 2015): what it must
-    be pushed with is less by that. A clamp also bears the pole of the root.
+    A rod that slides out of a guide is driven out by EI kappa^2 / 2, the force of a
+    sliding sleeve (Bigoni, Dal Corso, Bosi and Misseroni 2015): what it must be pushed
+    with is less by that. A clamp also bears the pole of the root.
 
     Parameters
     ----------
@@ -129,8 +127,7 @@ def read_step(
         Units of the kernels' lengths and forces.
     """
     # Three points an element, and the joints from the side of the root.
-    s = np.concatenate([[0.0], (rod.s[:-1, None] + np.diff(rod.s)[:, None]
-                                * np.array([1.0, 2.0, 3.0]) / 3.0).ravel()])  # fmt: skip
+    s = np.append(0.0, thirds(rod)[:, 1:])
     shape = trace(rod, u, s)
     shape[:2] *= length_mm
     shape[3] /= length_mm

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.jit import njit
-from ..planar.march import PART, field_at
+from ..magnet.flux import PART, field_at, is_uniform
 
 Array = NDArray[np.float64]
 
@@ -195,7 +195,7 @@ def own_energy(rod, field, u, bent):  # type: ignore[no-untyped-def]
             s = bent.sin[e, g]
             bx = by = 0.0
             if rod.m[e] != 0.0:
-                if field[0] == 0.0:
+                if is_uniform(field):
                     bx = field[1]
                     by = field[2]
                 else:

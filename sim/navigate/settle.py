@@ -13,23 +13,10 @@ import math
 import numpy as np
 
 from ...core.jit import njit
-from ..magnet.field import inside
-from ..planar.march import PART
-from .rod import Bent, bend, own_energy, own_gradient, own_stiffness, station
-from .touch import (
-    FIXED,
-    FLOATS,
-    MOST,
-    TIP,
-    anchor,
-    curvature,
-    slope,
-    locate,
-    nearest,
-    touch_energy,
-    touch_gradient,
-)
-from .walls import clearance
+from ..magnet.flux import PART, blocked, is_uniform
+from .exchange import look, prune, sort_kinds, strayed
+from .rod import Bent, bend, own_energy, own_gradient, own_stiffness
+from .touch import MOST, anchor, locate, touch_energy, touch_gradient
 
 SETTLED, RESTLESS, JAMMED, PULLED = range(4)
 """Outcomes: at rest; no convergence; no room left; pulled onto a magnet."""
@@ -38,10 +25,8 @@ SOFT, HARD = 1e6, 1e8
 how far."""
 GAP = 3e-10
 """Gaps closed to this count as closed, in lengths of the rod."""
-OVERLAP = 1e-6
-"""A place deeper than this behind a wall becomes a contact."""
-APART = 0.25
-"""Least distance of contacts on one piece, in elements."""
+TOO_DEEP = 3e-4
+"""A state with a point deeper than this behind a wall is none."""
 LOOSE = 1e-8
 """Gaps that are good enough if their contacts are so close that they share their force
 only slowly."""
@@ -160,10 +145,14 @@ def newton(rod, field, walls, half, u, bent, t, stiff, held, before, work):  # t
     """
     g, H, L, K, px, py, ax, ay, row, d, trial, keep = work
     last = u.shape[0] - (1 if rod.grip[0] != 0.0 else 0)
-    value = energy(rod, field, walls, half, u, bent, t, stiff, held, before)
+    value = 0.0
+    fresh = True
     kicked = False
     unstable = 0
     for step in range(STEPS):
+        if fresh:
+            value = energy(rod, field, walls, half, u, bent, t, stiff, held, before)
+            fresh = False
         own_gradient(rod, field, u, bent, px, py, ax, ay, g, H)
         touch_gradient(rod, u, bent, t, stiff, before, px, py, ax, ay, row, g, H)
         if rod.grip[0] != 0.0:
@@ -191,31 +180,26 @@ def newton(rod, field, walls, half, u, bent, t, stiff, held, before, work):  # t
             kicked = True
             for i in range(1, last):
                 u[i] += d[i]
-            value = energy(
-                rod, field, walls, half, u, bent, t, stiff, held, before
-            )
+            fresh = True
             continue
         share = min(1.0, LONGEST / size)
         keep[: t.count[0]] = t.s[: t.count[0]]
         done = False
-        for _ in range(30):
+        for _ in range(40):
             for i in range(u.shape[0]):
                 trial[i] = u[i]
             for i in range(1, last):
                 trial[i] += share * d[i]
-            new = energy(
-                rod, field, walls, half, trial, bent, t, stiff, held, before
-            )
+            new = energy(rod, field, walls, half, trial, bent, t, stiff, held, before)
             noise = 1e-13 * (1.0 + abs(value))
-            if new <= value - 1e-4 * share * fall + noise:
+            if share > 0.0 and new <= value - 1e-4 * share * fall + noise:
                 done = True
                 break
             t.s[: t.count[0]] = keep[: t.count[0]]
-            share *= 0.5
+            if share == 0.0:
+                break
+            share = 0.5 * share if share > 1e-9 else 0.0
         if not done:
-            value = energy(
-                rod, field, walls, half, u, bent, t, stiff, held, before
-            )
             return (step + 1 if size < 1e-7 else -step - 1), int(shift == 0.0), unstable
         for i in range(1, last):
             u[i] = trial[i]
@@ -240,196 +224,6 @@ def update_forces(rod, bent, t, stiff, held):  # type: ignore[no-untyped-def]
         held[0] -= stiff * dx
         held[1] -= stiff * dy
     return worst
-
-
-@njit(**PART)
-def lonely(t, piece, s, apart, but):  # type: ignore[no-untyped-def]
-    """Return whether no contact but `but` is on the same piece within `apart`."""
-    for k in range(t.count[0]):
-        if k != but and t.piece[k] == piece and abs(t.s[k] - s) < apart:
-            return False
-    return True
-
-
-@njit(**PART)
-def prune(t, keep):  # type: ignore[no-untyped-def]
-    """Drop contacts without force and clear of the wall; return how many."""
-    n = 0
-    for k in range(t.count[0]):
-        if t.force[k] == 0.0 and t.gap[k] > keep:
-            continue
-        t.piece[n] = t.piece[k]
-        t.kind[n] = t.kind[k]
-        t.s[n] = t.s[k]
-        t.force[n] = t.force[k]
-        t.grip[n] = t.grip[k]
-        t.gap[n] = t.gap[k]
-        t.home[n] = t.home[k]
-        t.room[n] = t.room[k]
-        t.nx[n] = t.nx[k]
-        t.ny[n] = t.ny[k]
-        t.tx[n] = t.tx[k]
-        t.ty[n] = t.ty[k]
-        t.x[n] = t.x[k]
-        t.y[n] = t.y[k]
-        t.way[n] = t.way[k]
-        n += 1
-    dropped = t.count[0] - n
-    t.count[0] = n
-    return dropped
-
-
-@njit(**PART)
-def look(rod, u, bent, walls, half, h, t, free):  # type: ignore[no-untyped-def]
-    """Find where the rod is behind a wall; add contacts there, or move those near.
-
-    Returns
-    -------
-    tuple of int and float
-        Contacts added or moved, and the deepest overlap seen.
-    """
-    n = rod.stiff.shape[0]
-    length = rod.s[-1]
-    changed = 0
-    deepest = 0.0
-    gaps = np.empty(4 * n + 1)
-    for piece in range(walls.first.shape[0] - 1):
-        for i in range(4 * n + 1):
-            e = min(i // 4, n - 1)
-            at = station(
-                rod, u, bent,
-                length if i == 4 * n
-                else rod.s[e] + 0.25 * (i % 4) * (rod.s[e + 1] - rod.s[e]),
-            )  # fmt: skip
-            gaps[i] = clearance(walls, piece, at.x, at.y).distance - half
-        for i in range(4 * n + 1):
-            if gaps[i] > h:
-                continue
-            if i > 0 and gaps[i - 1] < gaps[i]:
-                continue
-            if i < 4 * n and gaps[i + 1] <= gaps[i]:
-                continue
-            e = min(i // 4, n - 1)
-            s = length
-            if i < 4 * n:
-                s = rod.s[e] + 0.25 * (i % 4) * (rod.s[e + 1] - rod.s[e])
-                s = nearest(rod, u, bent, walls, piece, s, s, 0.3 * h)
-            at = station(rod, u, bent, s)
-            gap = clearance(walls, piece, at.x, at.y).distance - half
-            if s < 1e-9 or gap > -OVERLAP:
-                continue
-            deepest = max(deepest, -gap)
-            second = slope(clearance(walls, piece, at.x, at.y), at)[1]
-            if free and second > 2.0 * flat_below(h) and join(t, piece, s, h) == 1:
-                changed += 1
-            else:
-                changed += seat(t, piece, s, h, length, FLOATS if free else FIXED)
-    return changed, deepest
-
-
-@njit(**PART)
-def flat_below(h):  # type: ignore[no-untyped-def]
-    """Return the curvature of the gap below which one contact becomes two."""
-    return 4.0 * OVERLAP / (APART * h) ** 2
-
-
-@njit(**PART)
-def join(t, piece, s, h):  # type: ignore[no-untyped-def]
-    """Make two contacts near `s` one that floats; return 1 if there were just two."""
-    a = b = -1
-    n = 0
-    for k in range(t.count[0]):
-        if t.piece[k] == piece and t.kind[k] == FIXED and abs(t.s[k] - s) < h:
-            n += 1
-            a, b = b, k
-    if n != 2:
-        return 0
-    t.s[b] = t.home[b] = s
-    t.force[b] += t.force[a]
-    t.grip[b] += t.grip[a]
-    t.kind[b] = FLOATS
-    t.room[b] = 0.5 * APART * h
-    t.force[a] = 0.0
-    t.gap[a] = 1.0
-    return 1
-
-
-@njit(**PART)
-def seat(t, piece, s, h, length, kind):  # type: ignore[no-untyped-def]
-    """Put a contact at `s` unless one is near; return 1 if anything changed."""
-    is_tip = s > length - 1e-9
-    best = -1
-    for k in range(t.count[0]):
-        if t.piece[k] == piece and (t.kind[k] == TIP) == is_tip:
-            if best < 0 or abs(t.s[k] - s) < abs(t.s[best] - s):
-                best = k
-    if best >= 0 and abs(t.s[best] - s) < APART * h:
-        return 0
-    return add_touch(t, piece, s, TIP if is_tip else kind)
-
-
-@njit(**PART)
-def add_touch(t, piece, s, kind):  # type: ignore[no-untyped-def]
-    """Add a contact without force, if there is room for one; return 1 if so."""
-    if t.count[0] == MOST:
-        return 0
-    k = t.count[0]
-    t.count[0] += 1
-    t.piece[k] = piece
-    t.s[k] = s
-    t.force[k] = 0.0
-    t.grip[k] = 0.0
-    t.gap[k] = -1.0
-    t.home[k] = s
-    t.room[k] = 0.0
-    t.kind[k] = kind
-    return 1
-
-
-@njit(**PART)
-def sort_kinds(rod, u, bent, walls, half, t, h, free):  # type: ignore[no-untyped-def]
-    """Let isolated contacts float, the others stay; split one that begins to lie flat.
-
-    Two contacts, `APART` from each other, hold a rod that lies flat between them.
-    """
-    locate(rod, u, bent, walls, half, t)
-    for k in range(t.count[0]):
-        if t.kind[k] == TIP:
-            continue
-        if not free and t.kind[k] == FIXED:
-            continue
-        alone = lonely(t, t.piece[k], t.s[k], h, k) or t.bend[k] * h > 1.0
-        second = curvature(t, k)
-        half_apart = 0.5 * APART * h
-        s = t.s[k]
-        if not alone:
-            t.kind[k] = FIXED
-        elif (
-            second < flat_below(h)
-            and s > half_apart
-            and s < rod.s[-1] - half_apart
-            and t.force[k] > 0.0
-            and add_touch(t, t.piece[k], s + half_apart, FIXED) == 1
-        ):
-            t.kind[k] = FIXED
-            t.s[k] = s - half_apart
-            t.force[k] *= 0.5
-            t.force[t.count[0] - 1] = t.force[k]
-        else:
-            t.kind[k] = FLOATS
-            t.home[k] = s
-            t.room[k] = (0.5 if second > 1.0 else 0.5 * APART) * h
-
-
-@njit(**PART)
-def strayed(rod, t):  # type: ignore[no-untyped-def]
-    """Return how many floating contacts are as far from home as they may be."""
-    n = 0
-    for k in range(t.count[0]):
-        far = abs(t.s[k] - t.home[k]) > 0.999 * t.room[k]
-        if t.kind[k] == FLOATS and t.force[k] > 0.0 and far:
-            n += 1
-    return n
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -479,6 +273,7 @@ def settle(rod, field, walls, half, mu, u, t, held, before, soft):  # type: igno
     stable = 0
     deepest = 0.0
     before_this = 1e9
+    failed = 0
     bend(rod, u, bent)
     look(rod, u, bent, walls, half, h, t, True)
     outcome = RESTLESS
@@ -490,7 +285,7 @@ def settle(rod, field, walls, half, mu, u, t, held, before, soft):  # type: igno
         )
         total += abs(steps)
         unstable += off
-        if field[0] != 0.0 and inside(field[1:], bent.x[-1], bent.y[-1], 0.0, 0.0):
+        if not is_uniform(field) and within_magnet(rod, field, bent):
             outcome = PULLED
             break
         rubbed = rub(t, mu, stiff)
@@ -504,14 +299,26 @@ def settle(rod, field, walls, half, mu, u, t, held, before, soft):  # type: igno
             elif k >= FROZEN:
                 changed = 0
         if steps > 0 and changed == 0 and worst < (GAP if k < FROZEN else LOOSE):
-            outcome = SETTLED
+            outcome = SETTLED if deepest < TOO_DEEP else JAMMED
             break
+        failed += 1 if steps < 0 else 0
         if k > 8 and worst > 1e-4:
             outcome = JAMMED
+        if soft >= SOFT and (failed > 6 or (outcome == JAMMED and k > 14)):
+            break
         if worst > 0.1 * before_this:
             stiff = min(HARD, 10.0 * stiff)
         before_this = worst
     return outcome, stable, total, unstable, deepest, own_energy(rod, field, u, bent)
+
+
+@njit(**PART)
+def within_magnet(rod, field, bent):  # type: ignore[no-untyped-def]
+    """Tell whether a node of the rod is inside a source of the field."""
+    for i in range(1, rod.s.shape[0]):
+        if blocked(field, bent.x[i], bent.y[i], 0.0, 0.0):
+            return True
+    return False
 
 
 @njit(**PART)

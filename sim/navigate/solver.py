@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from ...core.checks import finite, listed, shown, size, whole, within
 from ...core.errors import InputError, SolverError
 from ...core.specimen import Specimen
-from ..fields import MagnetField, Support, check_case
+from ..fields import Support, check_case
 from .case import Case, FieldOfWay
 from .lumen import Lumen
 from .mesh import ELEMENTS, sections_of
@@ -146,11 +146,10 @@ def _limit(push_limit_N: float) -> float:
 def _check_plane(field: FieldOfWay, support: Support) -> None:
     """Refuse what would lift the rod out of the plane of the lumen."""
     first = field(0.0) if callable(field) else field
-    if isinstance(first, MagnetField) and not first.in_plane:
+    if not first.in_plane:
         raise InputError(
-            "a magnet beside a planar lumen must be symmetric about its plane "
-            "(elevation_deg 0, offset_mm z 0); instead received elevation_deg "
-            f"{first.magnet.elevation_deg:g}, offset z {first.magnet.offset_mm[2]:g} mm"
+            "a field in a planar lumen must be within its plane (elevation_deg 0, no "
+            f"offset in z); instead received {first}"
         )
     if not support.in_plane:
         raise InputError(

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.jit import njit
-from ..planar.march import PART
+from ..magnet.flux import PART
 from .rod import GAUSS, POINTS, WEIGHTS, angle_at, rows_at, station
 from .walls import clearance
 
@@ -88,7 +88,7 @@ class Before(NamedTuple):
     Parameters
     ----------
     s, x, y : ndarray, shape (m,)
-        Points of it; s negative within the guide.
+        Points of it, equally spaced; s negative within the guide.
     shift : float
         How much further out of the guide the rod is now.
     ease : float
@@ -174,8 +174,12 @@ def anchor(t, before):  # type: ignore[no-untyped-def]
         t.home[k] = t.s[k]
         t.tx[k] = t.ny[k]
         t.ty[k] = -t.nx[k]
-        t.x0[k] = np.interp(t.s[k] - before.shift, before.s, before.x)
-        t.y0[k] = np.interp(t.s[k] - before.shift, before.s, before.y)
+        m = before.s.shape[0] - 1
+        at = (t.s[k] - before.shift - before.s[0]) / (before.s[m] - before.s[0]) * m
+        i = max(0, min(int(at), m - 1))
+        f = at - i
+        t.x0[k] = (1.0 - f) * before.x[i] + f * before.x[i + 1]
+        t.y0[k] = (1.0 - f) * before.y[i] + f * before.y[i + 1]
 
 
 @njit(**PART)

@@ -8,10 +8,20 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..magnet.flux import UNIFORM
 from .case import Case
 from .lumen import Gate
 from .mesh import thirds, trace, unknowns
-from .passage import INSERTED, JAMMED, LIMIT, LOST, PULLED_ON, Event, Step
+from .passage import (
+    INSERTED,
+    JAMMED,
+    LIMIT,
+    LOST,
+    OVERPOWERED,
+    PULLED_ON,
+    Event,
+    Step,
+)
 from .readout import loads, push_force, read_step
 from .rod import Rod
 from .settle import JAMMED as NO_ROOM
@@ -66,7 +76,7 @@ def at_rest(
         if rod.grip[0]:
             u[-1] = rod.grip[3]
         guess, touches, shift = None, old.touches, 0.0
-        before = Before(np.zeros(2), np.zeros(2), np.zeros(2), 0.0, 1.0)
+        before = Before(np.array([0.0, 1.0]), np.zeros(2), np.zeros(2), 0.0, 1.0)
     else:
         shift = (insertion_mm - old.insertion_mm) / case.length_mm
         u, touches = follow(case, old, rod, shift)
@@ -194,10 +204,11 @@ class Walk:
             return new
         if not last_try:
             return None
-        outcome, new = at_rest(self.case, old, goal_mm, SOFTEST)
-        if outcome == SETTLED:
+        again, new = at_rest(self.case, old, goal_mm, SOFTEST)
+        if again == SETTLED:
             return new
-        self.outcome = WHY.get(outcome, LOST)
+        lost = OVERPOWERED if self.case.flux(goal_mm)[0] != UNIFORM else LOST
+        self.outcome = WHY.get(again) or WHY.get(outcome) or lost
         return None
 
     def _leaps(self, old: State, new: State) -> bool:
@@ -260,11 +271,15 @@ class Walk:
         for gate in self.case.lumen.gates:
             if crosses(gate, before, step.tip_mm):
                 self.events.append(
-                    Event(kind="gate", insertion_mm=at_mm, what=gate.name)
+                    Event(
+                        kind="gate" if at_mm > old.insertion_mm else "gate back",
+                        insertion_mm=at_mm,
+                        what=gate.name,
+                    )
                 )
 
     def error_mm(self) -> float:
-        """Return how far the last shape is from the one on elements of half the size."""
+        """Return how far the last shape is from the one on elements half as long."""
         state = self._here()
         fine = replace(self.case, elements=2 * self.case.elements, friction=0.0)
         if self.case.friction:

@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.jit import njit
-from ..planar.march import PART
+from ..magnet.flux import PART
 
 Array = NDArray[np.float64]
 
 KIND, AX, AY, DX, DY, SIZE, SIDE, HALF, MX, MY, REACH = range(11)
 """Columns of a part. Segment (kind 0): start, direction, length. Arc (kind 1): centre,
 direction of its middle, radius. Side: +1 if the lumen is to the left of the segment or
-outside the circle, else -1. Cosine of half the arc's sweep. Circle that holds it all."""
+outside the circle, else -1. Cosine of half the arc's sweep. Circle round it all."""
 SX, SY, EX, EY, SNX, SNY, ENX, ENY = range(11, 19)
 """Start and end of a part, and the normals there that tell the sides of a corner apart;
 (0, 0) at a free end, which has no wrong side."""

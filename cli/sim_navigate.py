@@ -1,0 +1,225 @@
+"""``magbend sim navigate``: a rod pushed through a lumen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .console import print_json
+
+if TYPE_CHECKING:
+    from ..core.specimen import Specimen
+    from ..sim.fields import Field
+    from ..sim.navigate import Lumen, Passage
+
+EXAMPLE = (
+    "Example: magbend sim navigate bend90.toml --gmc 2 --field-mT 20 --angle-deg 90 "
+    "--friction 0.1 --out passage"
+)
+
+
+def navigate(
+    lumen: Annotated[Path, typer.Argument(help="Lumen file (TOML).")],
+    gmc: Annotated[
+        int | None, typer.Option(help="Rod of the paper's Table 1, 1 to 7.")
+    ] = None,
+    specimen: Annotated[Path | None, typer.Option(help="Specimen file (TOML).")] = None,
+    field_mT: Annotated[
+        float | None, typer.Option("--field-mT", help="Uniform flux density in mT.")
+    ] = None,
+    angle_deg: Annotated[
+        float, typer.Option(help="Direction of the uniform field from +x, in deg.")
+    ] = 90.0,
+    magnet: Annotated[
+        Path | None, typer.Option(help="Magnet or source file (TOML).")
+    ] = None,
+    gap_mm: Annotated[
+        float | None,
+        typer.Option(help="From the N face to the point (rod's length, 0), in mm."),
+    ] = None,
+    poses: Annotated[
+        Path | None, typer.Option(help="Poses of the field over the insertion (TOML).")
+    ] = None,
+    way_mm: Annotated[
+        list[float] | None,
+        typer.Option(help="Insertion to go to, in mm; again for forth and back."),
+    ] = None,
+    step_mm: Annotated[float, typer.Option(help="Step of the insertion, in mm.")] = 0.5,
+    friction: Annotated[float, typer.Option(help="Coefficient of friction.")] = 0.0,
+    gravity_m_s2: Annotated[
+        tuple[float, float, float],
+        typer.Option(help="Free fall (x y z) in m/s2, within the plane."),
+    ] = (0.0, 0.0, 0.0),
+    push_limit_N: Annotated[
+        float | None, typer.Option("--push-limit-N", help="Give up above this, in N.")
+    ] = None,
+    elements: Annotated[int, typer.Option(help="Elements of the whole rod.")] = 24,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for tables, figure and film.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Push a rod through a planar lumen, with contact, friction and snaps.
+
+    Without --field-mT, --magnet or --poses there is no field.
+    """
+    from ..core.files import output_folder
+    from ..sim import Support
+    from ..sim import navigate as navigation
+
+    rod = _specimen(gmc, specimen)
+    field = _field(field_mT, angle_deg, magnet, gap_mm, poses)
+    place = navigation.read_lumen(lumen)
+    if out is not None:
+        output_folder(out)
+    passage = navigation.navigate(
+        rod,
+        place,
+        field,
+        way_mm=way_mm or None,
+        step_mm=step_mm,
+        friction=friction,
+        support=Support(gravity_m_s2=gravity_m_s2),
+        push_limit_N=float("inf") if push_limit_N is None else push_limit_N,
+        elements=elements,
+    )
+    data = _summary(passage)
+    if out is not None:
+        _write(out, place, passage, rod, data)
+    if as_json:
+        print_json(data | {"steps": [_row(step) for step in passage.steps]})
+    else:
+        _print(data, passage)
+
+
+def _specimen(gmc: int | None, file: Path | None) -> Specimen:
+    if (gmc is None) == (file is None):
+        raise typer.BadParameter("give either --gmc 1..7 or --specimen FILE")
+    if gmc is not None:
+        from ..sim import gmc as table1
+
+        return table1(gmc)
+    from ..core.specimen_file import read_specimen
+
+    return read_specimen(Path(str(file)))
+
+
+def _field(
+    field_mT: float | None,
+    angle_deg: float,
+    file: Path | None,
+    gap_mm: float | None,
+    poses: Path | None,
+) -> Any:
+    from ..sim import UniformField
+    from ..sim.navigate import moving, read_poses
+
+    if field_mT is not None and file is not None:
+        raise typer.BadParameter("give either --field-mT B or --magnet FILE")
+    if gap_mm is not None and file is None:
+        raise typer.BadParameter("--gap-mm belongs to --magnet")
+    field: Field = UniformField(flux_mT=field_mT or 0.0, angle_deg=angle_deg)
+    table = read_poses(poses) if poses is not None else []
+    if file is not None:
+        from ..sim import read_field
+
+        field = read_field(file)
+        if gap_mm is not None:
+            field = field.at_gap(gap_mm)
+        elif field.follows_gap and "gap_mm" not in (table or [{}])[0]:
+            raise typer.BadParameter("--magnet needs --gap-mm D, or poses with gap_mm")
+    return moving(field, table) if table else field
+
+
+def _summary(passage: Passage) -> dict[str, Any]:
+    last = passage.steps[-1]
+    return {
+        "lumen": passage.lumen,
+        "specimen": passage.specimen,
+        "outcome": passage.outcome,
+        "reached_mm": passage.reached_mm,
+        "gates": list(passage.gates),
+        "snaps": len(passage.snaps),
+        "most_push_N": passage.most("push_N"),
+        "most_root_curvature_per_mm": passage.most("root_curvature_per_mm"),
+        "most_wall_N": passage.most("wall_N"),
+        "tip_mm": last.tip_mm,
+        "tip_angle_deg": last.tip_angle_deg,
+        "rubbed_Nmm": last.rubbed_Nmm,
+        "overlap_mm": passage.most("overlap_mm"),
+        "error_mm": passage.error_mm,
+        "events": [
+            {name: getattr(event, name) for name in event.__slots__}
+            for event in passage.events
+        ],
+    }
+
+
+COLUMNS = (
+    "insertion_mm", "push_N", "root_curvature_per_mm", "root_moment_Nm",
+    "most_curvature_per_mm", "wall_N", "most_wall_N", "energy_Nmm", "rubbed_Nmm",
+    "tip_angle_deg", "overlap_mm",
+)  # fmt: skip
+
+
+def _row(step: Any) -> dict[str, Any]:
+    row = {name: getattr(step, name) for name in COLUMNS}
+    row["tip_x_mm"], row["tip_y_mm"] = step.tip_mm
+    row["contacts"] = [
+        {name: getattr(contact, name) for name in contact.__slots__}
+        for contact in step.contacts
+    ]
+    return row
+
+
+def _write(
+    folder: Path, lumen: Lumen, passage: Passage, rod: Specimen, data: dict[str, Any]
+) -> None:
+    import pandas as pd
+
+    from ..core.files import write_text
+    from ..core.json import write_json
+    from ..sim.navigate import draw_passage, film
+
+    rows = [_row(step) for step in passage.steps]
+    contacts = [
+        {"insertion_mm": row["insertion_mm"]} | contact
+        for row in rows
+        for contact in row.pop("contacts")
+    ]
+    steps = pd.DataFrame(rows).to_csv(index=False)
+    write_text(folder / "steps.csv", steps)
+    heads = ["insertion_mm", "wall", "s_mm", "x_mm", "y_mm", "force_N", "friction_N"]
+    table = pd.DataFrame(contacts, columns=heads)
+    write_text(folder / "contacts.csv", table.to_csv(index=False))
+    passage.steps[-1].centreline.to_csv(folder / "shape.csv")
+    write_json(folder / "passage.json", data)
+    side_mm = max(rod.sides_mm)
+    draw_passage(folder / "passage.png", lumen, passage, side_mm=side_mm)
+    film(folder / "passage.gif", lumen, passage, side_mm=side_mm)
+    typer.echo(f"wrote {folder}", err=True)
+
+
+def _print(data: dict[str, Any], passage: Passage) -> None:
+    typer.echo(f"{data['specimen']} in {data['lumen']}: {data['outcome']}")
+    typer.echo(f"  reached         {data['reached_mm']:.3f} mm")
+    typer.echo(f"  gates           {', '.join(data['gates']) or 'none'}")
+    x, y = data["tip_mm"]
+    typer.echo(
+        f"  tip             ({x:.4f}, {y:.4f}) mm, {data['tip_angle_deg']:.3f} deg"
+    )
+    typer.echo(f"  greatest push   {1e3 * data['most_push_N']:.4g} mN")
+    typer.echo(f"  root curvature  {data['most_root_curvature_per_mm']:.4g} 1/mm")
+    typer.echo(f"  on the walls    {1e3 * data['most_wall_N']:.4g} mN")
+    for event in passage.snaps:
+        typer.echo(
+            f"  snap            at {event.insertion_mm:.3f} mm: the rod moves "
+            f"{event.moved_mm:.2f} mm and loses {event.released_Nmm:.3g} N mm"
+        )
+    typer.echo(
+        f"  overlap         {data['overlap_mm']:.1e} mm at most, between contacts"
+    )
+    if data["error_mm"] == data["error_mm"]:
+        typer.echo(f"  error           {data['error_mm']:.1e} mm, of the last shape")

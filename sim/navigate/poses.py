@@ -1,0 +1,89 @@
+"""A field that moves with the insertion: poses, and straight lines between them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...core.checks import shown
+from ...core.errors import InputError
+from ..fields import Field, UniformField
+
+KEYS = {
+    True: ("flux_mT", "angle_deg"),
+    False: ("gap_mm", "axis_angle_deg"),
+}
+"""What a pose may say of a uniform field, and of magnets."""
+
+
+def moving(
+    field: Field | None, poses: Sequence[dict[str, float]]
+) -> Callable[[float], Field]:
+    """Return the field as a function of the insertion.
+
+    Parameters
+    ----------
+    field : Field or None
+        Magnets, which the poses move by their `gap_mm` and `axis_angle_deg`; None or a
+        uniform field: the poses give `flux_mT` and `angle_deg`.
+    poses : sequence of dict
+        Each with `insertion_mm`, rising, and the same other keys. Before the first and
+        after the last the field stays; between them it changes in a straight line.
+
+    Raises
+    ------
+    InputError
+        If a key is missing, unknown, or the insertions do not rise.
+
+    Examples
+    --------
+    >>> field = moving(None, [{"insertion_mm": 0.0, "flux_mT": 0.0},
+    ...                       {"insertion_mm": 10.0, "flux_mT": 20.0}])
+    >>> field(5.0)
+    UniformField(flux_mT=10.0, angle_deg=90.0)
+    """
+    uniform = field is None or isinstance(field, UniformField)
+    keys = KEYS[uniform]
+    if not poses:
+        raise InputError("poses must have at least one pose; instead received none")
+    given = sorted(set(poses[0]) - {"insertion_mm"})
+    for pose in poses:
+        unknown = set(pose) - {"insertion_mm", *keys}
+        if unknown or "insertion_mm" not in pose or set(given) - set(pose):
+            raise InputError(
+                f"each pose must have insertion_mm and the same of {', '.join(keys)}; "
+                f"instead received {shown(pose)}"
+            )
+    at = [float(pose["insertion_mm"]) for pose in poses]
+    if any(b <= a for a, b in itertools.pairwise(at)):
+        raise InputError(
+            f"insertion_mm of the poses must rise, in mm; instead received {at}"
+        )
+
+    def here(insertion_mm: float) -> Field:
+        now = {
+            key: float(np.interp(insertion_mm, at, [pose[key] for pose in poses]))
+            for key in given
+        }
+        if uniform:
+            start = field if isinstance(field, UniformField) else None
+            flux_mT = start.flux_mT if start else 0.0
+            return UniformField(**({"flux_mT": flux_mT} | now))
+        return _moved(field, now)
+
+    here(at[0])
+    return here
+
+
+def _moved(field: Any, now: dict[str, float]) -> Field:
+    angle = {k: v for k, v in now.items() if k == "axis_angle_deg"}
+    sources = [
+        replace(source, **angle) if hasattr(source, "axis_angle_deg") else source
+        for source in field.sources
+    ]
+    moved = Field(sources)
+    return moved.at_gap(now["gap_mm"]) if "gap_mm" in now else moved

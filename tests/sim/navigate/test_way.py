@@ -1,0 +1,162 @@
+"""What happens on the way: branches, jams, snaps, forth and back."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from magbend.core.magnet import Magnet
+from magbend.core.specimen import Section, Specimen
+from magbend.sim import MagnetField, Support, UniformField, gmc
+from magbend.sim.navigate import Lumen, Wall, channel, navigate, polyline, read_lumen
+
+LUMENS = Path(__file__).parents[3] / "fixtures" / "lumens"
+NOTHING = UniformField(flux_mT=0.0)
+
+
+def mirrored(lumen: Lumen) -> Lumen:
+    def flip(points):
+        return [(x, -y) for x, y in points]
+
+    lines = [
+        [arc.at(0.0) for arc in wall.arcs] + [wall.arcs[-1].at(1.0)]
+        for wall in lumen.walls
+    ]
+    return Lumen(
+        name=lumen.name,
+        walls=tuple(
+            Wall(wall.name, polyline(flip(line)))
+            for wall, line in zip(lumen.walls, lines, strict=True)
+        ),
+        inside_mm=(lumen.inside_mm[0], -lumen.inside_mm[1]),
+    )
+
+
+@pytest.mark.parametrize(("sign", "branch"), [(1, "left branch"), (-1, "right branch")])
+def test_the_field_chooses_the_branch(sign, branch):
+    fork = read_lumen(LUMENS / "fork.toml")
+    field = UniformField(flux_mT=sign * 60.0)
+    passage = navigate(gmc(2), fork, field, way_mm=26.0, refine=False)
+    assert passage.gates == (branch,)
+    assert passage.outcome == "inserted"
+
+
+def test_the_mirrored_lumen_gives_the_mirrored_rod():
+    zigzag = Lumen(
+        name="zigzag",
+        walls=(
+            Wall("top", polyline([(0, 1.5), (8, 1.5), (20, 8), (31, 8)])),
+            Wall("bottom", polyline([(0, -1.5), (9, -1.5), (21, 5), (31, 5)])),
+        ),
+        inside_mm=(1.0, 0.0),
+    )
+    one = navigate(gmc(2), zigzag, NOTHING, refine=False).steps[-1]
+    other = navigate(gmc(2), mirrored(zigzag), NOTHING, refine=False).steps[-1]
+    assert one.tip_mm == pytest.approx((other.tip_mm[0], -other.tip_mm[1]), abs=1e-7)
+    assert one.push_N == pytest.approx(other.push_N, rel=1e-6)
+    assert len(one.contacts) == len(other.contacts) == 3
+
+
+def test_every_shape_stays_in_the_lumen_and_touches_where_it_is_pressed():
+    bend = read_lumen(LUMENS / "bend90.toml")
+    passage = navigate(gmc(4), bend, NOTHING, refine=False)
+    half_mm = 0.5 * max(gmc(4).sides_mm)
+    for step in passage.steps:
+        for contact in step.contacts:
+            assert contact.force_N > 0.0
+            x, y = contact.x_mm, contact.y_mm
+            if 5.0 <= x and y <= 10.0:
+                off = abs(math.hypot(x - 5.0, y - 10.0) - 10.0)
+                assert off == pytest.approx(1.25 - half_mm, abs=1e-6)
+    assert passage.most("overlap_mm") < 1e-3
+
+
+def test_without_friction_and_snaps_the_way_back_is_the_way():
+    bend = channel("bend", width_mm=2.5, legs=[(5.0, 0.0), (15.0, 60.0), (15.0, 0.0)])
+    passage = navigate(gmc(2), bend, NOTHING, way_mm=(28.0, 18.0), refine=False)
+    out = {step.insertion_mm: step.push_N for step in passage.steps[:56]}
+    back = passage.steps[-1]
+    assert back.push_N == pytest.approx(out[18.0], abs=1e-9)
+
+
+def test_friction_leaves_a_loop_of_the_work_it_took():
+    bend = channel("bend", width_mm=2.5, legs=[(5.0, 0.0), (15.0, 60.0), (15.0, 0.0)])
+    passage = navigate(
+        gmc(2), bend, NOTHING, way_mm=(28.0, 18.0), friction=0.2, refine=False
+    )
+    out = next(s for s in passage.steps if s.insertion_mm == 18.0)
+    assert passage.steps[-1].push_N < out.push_N - 1e-4
+    assert passage.steps[-1].rubbed_Nmm > out.rubbed_Nmm
+
+
+def blind() -> Lumen:
+    return Lumen(
+        name="blind",
+        walls=(Wall("box", polyline([(0, 2), (20, 2), (20, -2), (0, -2)])),),
+        inside_mm=(1.0, 0.0),
+    )
+
+
+def test_a_push_beyond_its_limit_ends_the_way():
+    passage = navigate(
+        gmc(2), blind(), UniformField(flux_mT=5.0), push_limit_N=0.1, refine=False
+    )
+    assert passage.outcome == "push force beyond its limit"
+    assert 19.5 < passage.reached_mm < 22.0
+    assert passage.steps[-1].push_N > 0.1
+
+
+def test_a_blind_end_makes_the_rod_fold_and_snap():
+    passage = navigate(
+        gmc(2), blind(), UniformField(flux_mT=5.0), way_mm=24.6, refine=False
+    )
+    assert passage.most("push_N") > 0.5
+    snap = passage.snaps[0]
+    assert snap.released_Nmm > 0.0
+    assert snap.moved_mm > 1.0
+    for step in passage.steps:
+        assert step.shape[0].max() < 20.0
+        assert abs(step.shape[1]).max() < 2.0
+
+
+def test_a_rod_that_is_pulled_onto_the_magnet_is_named():
+    rod = Specimen(
+        name="soft", side_mm=0.5, remanence_mT=-200.0,
+        sections=(Section(length_mm=40.0, E_MPa=0.5),),
+    )  # fmt: skip
+    field = MagnetField(magnet=Magnet.cube(30.0, 1.3), gap_mm=6.0)
+    lumen = channel("wide", width_mm=60.0, legs=[(60.0, 0.0)])
+    passage = navigate(rod, lumen, field, refine=False)
+    assert "magnet" in passage.outcome
+    assert passage.reached_mm < 40.0
+
+
+def test_a_pushed_rod_buckles_outside_of_the_lumen():
+    """Held at its root, it is a column between its clamp and the mouth."""
+    rod = Specimen(
+        name="soft", side_mm=1.0, remanence_mT=0.0,
+        sections=(Section(length_mm=40.0, E_MPa=2.0),),
+    )  # fmt: skip
+    narrow = Lumen(
+        name="narrow",
+        walls=(
+            Wall("box", polyline([(0, 0.55), (15, 0.55), (15, -0.55), (0, -0.55)])),
+        ),
+        inside_mm=(1.0, 0.0),
+        mode="push",
+    )
+    passage = navigate(rod, narrow, NOTHING, way_mm=(14.499, 14.52), refine=False)
+    last = passage.steps[-1]
+    free_mm = 40.0 - last.insertion_mm
+    EI = 2.0 / 12.0
+    clamped_N = 4.0 * math.pi**2 * EI / free_mm**2
+    assert 0.4 * clamped_N < last.push_N < 1.1 * clamped_N
+    assert abs(last.shape[1]).max() > 0.1
+
+
+def test_weight_across_the_lumen_is_refused():
+    lumen = channel("tube", width_mm=3.0, legs=[(40.0, 0.0)])
+    with pytest.raises(ValueError, match="a floor would carry it"):
+        navigate(gmc(2), lumen, NOTHING, support=Support(gravity_m_s2=(0.0, 0.0, -9.8)))
