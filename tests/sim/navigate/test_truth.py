@@ -120,8 +120,8 @@ def test_a_rod_against_a_smooth_end_wall_buckles_at_eulers_quarter():
 def test_a_heavy_rod_lies_down_on_the_floor():
     """Clamped level above a floor, it hangs free over (72 EI h / w)^(1/4).
 
-    Where it touches down the floor carries w l / 3 as a point, as beam theory has it for
-    small slopes, and then the weight of the rest along the line of contact.
+    Where it touches down the floor carries w l / 3 as a point, as beam theory has it
+    for small slopes, and then the weight of the rest along the line of contact.
     """
     rod = uniform(60.0, 2.0, density_kg_m3=2640.0)
     drop_mm = 0.05

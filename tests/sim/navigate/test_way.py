@@ -67,7 +67,7 @@ def test_every_shape_stays_in_the_lumen_and_touches_where_it_is_pressed():
         for contact in step.contacts:
             assert contact.force_N > 0.0
             x, y = contact.x_mm, contact.y_mm
-            if 5.0 <= x and y <= 10.0:
+            if x >= 5.0 and y <= 10.0:
                 off = abs(math.hypot(x - 5.0, y - 10.0) - 10.0)
                 assert off == pytest.approx(1.25 - half_mm, abs=1e-6)
     assert passage.most("overlap_mm") < 1e-3
