@@ -87,9 +87,14 @@ def design(
     from ..analysis.design import search as designing
     from ..analysis.surrogate import figures as model_figures
     from ..core.files import output_folder
+    from ..core.slips import refuse_slip
 
     if figure is not None:
         model_figures.check_path(figure)
+    for name, value in (
+        ("flux_mT", flux_mT), ("gap_mm", gap_mm), ("remanence_mT", remanence_mT),
+    ):  # fmt: skip
+        refuse_slip(name, value)
     goal = _goal(
         radius_mm, tip_mm, tip_angle_deg, curve, polyline, calibration, rod_height_mm,
         Reading(unit=unit, flip=flip, align=align),
@@ -179,6 +184,7 @@ def _field(
 
 def _range(text: str | None, option: str) -> tuple[float, float] | None:
     from ..core.errors import InputError
+    from ..core.slips import refuse_slip
 
     if text is None:
         return None
@@ -188,6 +194,8 @@ def _range(text: str | None, option: str) -> tuple[float, float] | None:
         ends = []
     if len(ends) not in (1, 2):
         raise InputError(f"{option} must be a number or LOW:HIGH; received {text!r}")
+    for end in ends:
+        refuse_slip(option.removeprefix("--").replace("-", "_"), end)
     return ends[0], ends[-1]
 
 

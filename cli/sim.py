@@ -133,8 +133,11 @@ def _specimen(
 def _field(
     field_mT: float | None, angle_deg: float, file: Path | None, gap_mm: float | None
 ) -> Field:
+    from ..core.slips import refuse_slip
     from ..sim.fields import UniformField
 
+    refuse_slip("flux_mT", field_mT)
+    refuse_slip("gap_mm", gap_mm)
     if (field_mT is None) == (file is None):
         raise typer.BadParameter("give either --field-mT B or --magnet FILE")
     if field_mT is not None:

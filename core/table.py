@@ -99,7 +99,9 @@ def _without_comments(
     lines: Sequence[str], signs: str
 ) -> tuple[list[int], list[int], str]:
     """Return the indices of table lines and of comments, and what ``sep=`` says."""
-    kept, said, separator = [], [], ""
+    kept: list[int] = []
+    said: list[int] = []
+    separator = ""
     for i, line in enumerate(lines):
         text = line.strip()
         if not text:

@@ -19,6 +19,7 @@ from pydantic import (
 )
 
 from .errors import ConfigError
+from .slips import slip_of
 
 Location = tuple[int | str, ...]
 Model = TypeVar("Model", bound="FileModel")
@@ -42,6 +43,17 @@ class FileModel(BaseModel):
         number = bool(kinds & {int, float}) and type(value) not in kinds
         if number and isinstance(value, (str, bool)):
             raise ValueError("must be a number, without quotes")
+        return value
+
+    @field_validator("*", mode="after")
+    @classmethod
+    def _no_slip_of_the_unit(cls, value: Any, info: ValidationInfo) -> Any:
+        name, of_magnet = info.field_name or "", "remanence_T" in cls.model_fields
+        for one in value if isinstance(value, (list, tuple)) else (value,):
+            if isinstance(one, (int, float)) and not isinstance(one, bool):
+                question = slip_of(name, float(one), of_magnet=of_magnet)
+                if question:
+                    raise ValueError(question)
         return value
 
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from .shapes import Array, RawShape
+
+Indices = NDArray[np.intp]
 
 
 def path_length(points: Array) -> float:
@@ -26,7 +29,7 @@ def arc_length(points: Array) -> Array:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def order_of(raw: RawShape, points: Array, notes: list[str]) -> Array:
+def order_of(raw: RawShape, points: Array, notes: list[str]) -> Indices:
     """Return the places of the points from clamp to tip; notes say what was mended.
 
     Raises
@@ -65,7 +68,7 @@ def _is_reversed(points: Array) -> bool:
     return bool(last < 0.05 * path_length(points) and last < 0.2 * first)
 
 
-def _chain(points: Array) -> Array:
+def _chain(points: Array) -> Indices:
     """Order points as a line: from an end to the nearest left, over and over."""
     if len(points) > 20_000:
         return np.arange(len(points))
@@ -86,7 +89,7 @@ def _chain(points: Array) -> Array:
                 at = int(free[0])
                 break
             count *= 4
-    return np.array(order)
+    return np.array(order, dtype=np.intp)
 
 
 def aligned(points: Array) -> tuple[Array, float]:

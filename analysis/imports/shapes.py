@@ -168,7 +168,7 @@ def _of_case(
         return values if isinstance(values, np.ndarray) else None
 
     x, y, material = numbers("x"), numbers("y"), numbers("X")
-    lengths = [name for name in ("x", "y", "s") if name in at]
+    lengths: list[str] = [name for name in ("x", "y", "s") if name in at]
     if x is None or y is None:
         x, y, lengths = _displaced(numbers)
     if x is None or y is None:

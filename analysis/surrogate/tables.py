@@ -325,10 +325,10 @@ def _case(
         flux_mT=value("flux_mT"),
         angle_deg=np.array([values.get("angle_deg", 90.0)]),
     )
-    load = float(design.remanence_mT[0] * design.flux_mT[0])
+    load = values["remanence_mT"] * values["flux_mT"]
     shape = judged(
         raw, how, length_mm=float(design.length_mm.sum()),
-        side=load * math.sin(math.radians(float(design.angle_deg[0]))),
+        side=load * math.sin(math.radians(values.get("angle_deg", 90.0))),
     )  # fmt: skip
     return Case(
         design=design, s_mm=shape.line.s_mm, points_mm=shape.line.points_mm,

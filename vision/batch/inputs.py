@@ -189,7 +189,7 @@ def read_source(source: Source, *, linear: bool | None = None) -> Photo:
         raise VisionError(
             f"{source.path.name}: this video cannot be opened or has no frames"
         )
-    pixels = video.read(source.frame)
+    pixels = video.read(source.frame or 0)
     if pixels is None:
         raise VisionError(
             f"{source.path.name}: frame {source.frame} cannot be decoded; "

@@ -257,7 +257,7 @@ def _linear(values: NDArray[Any], *, linear: bool) -> NDArray[np.float32]:
     if values.dtype == np.uint8:
         return np.asarray(cv2.LUT(values, _table(8, linear)), np.float32)
     if values.dtype == np.uint16:
-        return _table(16, linear)[values]
+        return np.asarray(_table(16, linear)[values], np.float32)
     return np.ascontiguousarray(values, dtype=np.float32)
 
 
