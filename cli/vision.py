@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from ..core.errors import InputError
+from . import vision_points
 from .console import JSON, group, print_json, progress
 
 if TYPE_CHECKING:
@@ -21,6 +22,7 @@ app = group(
     "Photographs to calibrated centrelines in mm.",
     "magbend vision extract photo.png --calibration calibration.json --out measured",
 )
+vision_points.register(app)
 
 LINEAR = typer.Option(
     None, "--linear/--no-linear",

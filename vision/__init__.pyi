@@ -13,6 +13,9 @@ from .batch.inputs import (
 from .batch.overlay import (
     draw_overlay as draw_overlay,
 )
+from .batch.rescue import (
+    rescue as rescue,
+)
 from .batch.run import (
     BatchResult as BatchResult,
 )
@@ -72,6 +75,12 @@ from .extraction.extract import (
 )
 from .extraction.follow import (
     follow as follow,
+)
+from .extraction.hints import (
+    Hints as Hints,
+)
+from .extraction.hints import (
+    measure_hinted as measure_hinted,
 )
 from .extraction.setting import (
     Setting as Setting,

@@ -30,9 +30,9 @@ FRAME_HEADER = (
     "width_mm", "clamp_x_px", "clamp_y_px", "tip_x_px", "tip_y_px", "clamp_x_mm",
     "clamp_y_mm", "clamp_angle_deg", "rod_height_mm", "reason",
     "clamp_angle_sd_deg", "own_angle_deg", "own_angle_sd_deg", "shared_clamp",
-    "length_sd_mm", "tip_x_sd_mm", "tip_y_sd_mm", "width_sd_mm", "clamp_sd_mm",
+    "length_sd_mm", "tip_x_sd_mm", "tip_y_sd_mm", "width_sd_mm", "clamp_sd_mm", "hints",
 )  # fmt: skip
-_FRAME_TEXTS = ("image", "status", "flags", "reason", "shared_clamp")
+_FRAME_TEXTS = ("image", "status", "flags", "reason", "shared_clamp", "hints")
 _FRAME_NUMBERS = tuple(name for name in FRAME_HEADER if name not in _FRAME_TEXTS)
 EDGE_HEADER = ("image", "side", "point", "x_px", "y_px", "x_mm", "y_mm")
 SIDES = ("left", "right")
@@ -45,7 +45,8 @@ class FrameRow:
     The direction of `pose`, known to `clamp_angle_sd_deg`, is that of `shared_clamp`,
     the run or video whose photographs give it together; where that is empty it is the
     photograph's own, ``own_angle_deg``, which stays in the table. ``..._sd_...`` are
-    standard deviations, as in `Measurement`.
+    standard deviations, as in `Measurement`. `hints` is what a person
+    pointed at (`extraction.hints`).
     """
 
     image: str
@@ -67,6 +68,7 @@ class FrameRow:
     tip_sd_mm: tuple[float, float] = NAN2
     width_sd_mm: float = math.nan
     clamp_sd_mm: float = math.nan
+    hints: str = ""
 
     @property
     def ok(self) -> bool:
@@ -264,6 +266,7 @@ def _frame_cells(row: FrameRow) -> list[str]:
     return [
         row.image, row.status, ";".join(row.flags), *map(_cell, sizes), row.reason,
         *map(_cell, angles), row.shared_clamp, *map(_cell, deviations),
+        row.hints,
     ]  # fmt: skip
 
 
@@ -299,6 +302,7 @@ def _frame(text: Mapping[str, str], number: Mapping[str, float]) -> FrameRow:
         tip_sd_mm=(value("tip_x_sd_mm"), value("tip_y_sd_mm")),
         width_sd_mm=value("width_sd_mm"),
         clamp_sd_mm=value("clamp_sd_mm"),
+        hints=text["hints"],
     )
 
 

@@ -90,7 +90,7 @@ def _measure(photo: Photo, setting: Setting) -> Measurement:
     sought = setting.sought(photo.size_px)
     quick, doubt = None, LostError("no_rod", "nothing stands out from the background")
     try:
-        quick = _of_rod(photo, setting, *find_rod(photo, sought))
+        quick = measure_candidate(photo, setting, *find_rod(photo, sought))
         if TIP_GOES_ON not in quick.flags:
             return quick
     except LostError as lost:
@@ -98,7 +98,7 @@ def _measure(photo: Photo, setting: Setting) -> Measurement:
     except BROKEN:
         pass
     try:
-        whole = _of_rod(photo, setting, *search_rod(photo, sought))
+        whole = measure_candidate(photo, setting, *search_rod(photo, sought))
     except (LostError, *BROKEN) as lost:
         if quick is not None:
             return quick
@@ -110,9 +110,16 @@ def _measure(photo: Photo, setting: Setting) -> Measurement:
     return whole
 
 
-def _of_rod(
+def measure_candidate(
     photo: Photo, setting: Setting, candidate: Candidate, view: View
 ) -> Measurement:
+    """Measure a rod that was found roughly.
+
+    Raises
+    ------
+    LostError
+        If there is nothing to vouch for.
+    """
     grey, sign = view.grey, view.sign
     start = _start(grey, candidate, sign)
     if start.rough:

@@ -42,6 +42,35 @@ def turned(photo: Photo, orientation: int) -> Photo:
     )
 
 
+def turned_points(
+    points_px: NDArray[np.float64], photo: Photo, orientation: int
+) -> NDArray[np.float64]:
+    """Return where points of an upright photograph lie once it is `turned`.
+
+    Parameters
+    ----------
+    points_px : ndarray, shape (n, 2)
+        x and y in `photo`.
+    photo : Photo
+        As it was before.
+    orientation : int
+        Of the photograph to agree with.
+    """
+    own = photo.orientation
+    if own == orientation:
+        return points_px
+    x, y = points_px.T
+    width, height = photo.size_px
+    for turn in (_BACK.get(own, own), orientation):
+        if turn in (5, 6, 7, 8):
+            x, y, width, height = y, x, height, width
+        if turn in (3, 4, 7, 8):
+            y = height - 1 - y
+        if turn in (2, 3, 6, 7):
+            x = width - 1 - x
+    return np.column_stack([x, y])
+
+
 def _decoded(decode: Any, own: int, other: int) -> NDArray[Any]:
     return np.ascontiguousarray(_as_sensor(decode(), own, other))
 
