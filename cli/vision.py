@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +13,11 @@ import typer
 from ..core.errors import InputError
 from . import vision_points
 from .console import JSON, group, print_json, progress
+from .vision_show import calibration_facts, tell_calibration, tell_frames
 
 if TYPE_CHECKING:
-    from ..vision import Board, Calibration, FrameRow, Setting
+    from ..core import Specimen
+    from ..vision import Board, Calibration, Setting
 
 app = group(
     "vision",
@@ -135,11 +137,11 @@ def calibrate(
             focal_px=focal_px,
         )
     write_calibration(result, out)
-    facts = _calibration_facts(result)
+    facts = calibration_facts(result)
     if json_output:
         print_json({"calibration": str(out), **facts})
         return
-    _tell_calibration(result, facts, out)
+    tell_calibration(result, facts, out)
 
 
 @app.command(
@@ -171,6 +173,11 @@ def extract(
     ),
     joints_mm: str = typer.Option(
         "", "--joints-mm", help="Where the stiffness jumps, such as 10,20."
+    ),
+    specimen: Path = typer.Option(
+        None, "--specimen",
+        help="The rod (TOML): its side, length and joints help to find and measure "
+        "it; default: the run's own.",
     ),
     free: bool = typer.Option(
         False, "--free", help="Measure things without a clamp too, end to end."
@@ -207,7 +214,7 @@ def extract(
 ) -> None:  # fmt: skip
     """Measure the rod's centreline in photographs."""
     from ..core.files import output_file, output_folder
-    from ..vision import extract_files, figure_kind, list_sources
+    from ..vision import extract_files, figure_kind, list_sources, with_specimen
 
     if figure_steps is not None:
         figure_kind(figure_steps)
@@ -230,6 +237,9 @@ def extract(
         clamp="none" if free else "auto",
         linear=linear,
     )
+    rod = _specimen(specimen, run)
+    if rod is not None:
+        setting = with_specimen(setting, rod)
     for path in (edges, figure_steps):
         if path is not None:
             output_file(path)
@@ -252,7 +262,7 @@ def extract(
 
         index = next(i for i, frame in enumerate(result.frames) if frame.ok)
         figure_of_steps(read_source(sources[index]), setting, figure_steps)
-    _tell_frames(result, json_output=json_output)
+    tell_frames(result, json_output=json_output)
 
 
 def _two_numbers(text: str, option: str) -> tuple[int, int]:
@@ -332,59 +342,26 @@ def _without_board(
     )
 
 
-def _calibration_facts(result: Calibration) -> dict[str, Any]:
-    return {
-        "mm_per_px": result.mm_per_px(result.centre_px, height_mm=0.0),
-        "scale_relative_sd": result.scale_relative_sd,
-        "rms_px": result.rms_px,
-        "tilt_deg": result.tilt_deg,
-        "focal_px": result.focal_px[0],
-        "distortion": result.distortion,
-        "camera_height_mm": result.camera_height_mm,
-        "camera_height_sd_mm": result.camera_height_sd_mm,
-        "camera_height_source": result.camera_height_source,
-        "rod_height_mm": result.rod_height_mm,
-        "views": [
-            {
-                "name": view.name,
-                "rms_px": view.rms_px,
-                "corners": view.corners,
-                "used": view.used,
-                "why_not": view.why_not,
-            }
-            for view in result.views
-        ],
-    }
-
-
-def _tell_calibration(result: Calibration, facts: dict[str, Any], out: Path) -> None:
-    for view in result.views:
-        verdict = "used" if view.used else f"dropped: {view.why_not}"
-        typer.echo(
-            f"{view.name}: {view.corners} corners, RMS {view.rms_px:.3f} px, {verdict}"
-        )
-    typer.echo(f"scale {facts['mm_per_px']:.7f} mm/px, tilt {result.tilt_deg:.2f} deg")
-    if math.isfinite(result.camera_height_sd_mm):
-        height, sd = result.camera_height_mm, result.camera_height_sd_mm
-        typer.echo(
-            f"camera {height:.0f} +- {sd:.0f} mm above the plane "
-            f"({result.camera_height_source}); per mm of height the scale shrinks by "
-            f"{100.0 / height:.3f} +- {100.0 * sd / height**2:.3f} %"
-        )
-        if sd > 0.3 * height:
-            typer.echo(
-                "The camera's height is hardly known. If the rod lies above the "
-                "board's plane, give --camera-height-mm or add tilted photographs."
-            )
-    else:
-        typer.echo(f"camera height {result.camera_height_source}")
-    typer.echo(f"{out}: written")
-
-
 def _only_run(images: list[Path]) -> Path | None:
     if len(images) == 1 and (images[0] / "run.json").exists():
         return images[0]
     return None
+
+
+def _specimen(path: Path | None, run: Path | None) -> Specimen | None:
+    """Return the rod of a file, else of a run; None where neither tells."""
+    from ..core import read_specimen
+    from ..core.specimen_file import SpecimenModel
+
+    if path is not None:
+        return read_specimen(path)
+    if run is None:
+        return None
+    try:
+        record = json.loads((run / "run.json").read_text(encoding="utf-8"))
+        return SpecimenModel.model_validate(record["specimen"]).specimen()
+    except (OSError, ValueError, KeyError, TypeError, InputError):
+        return None  # the run says so itself, to whoever reads it as a run
 
 
 def _setting(
@@ -405,8 +382,8 @@ def _setting(
     if "length_mm" in given:
         positive(given["length_mm"], "--length-mm", "mm")
     if known is not None:
-        given.setdefault("rod_height_mm", known.rod_height_mm)
-        _below_the_camera(given["rod_height_mm"], known.camera_height_mm)
+        height_mm = given.get("rod_height_mm", known.rod_height_mm)
+        _below_the_camera(height_mm, known.camera_height_mm)
     return Setting(
         calibration=known,
         bare=None if bare is None else read_bare(bare, linear=others.get("linear")),
@@ -436,61 +413,3 @@ def _workers(pictures: int) -> int:
     import os
 
     return 1 if pictures < 60 else max(1, os.cpu_count() or 1)
-
-
-_TOLD_ONCE = ("uncalibrated", "clamp_moved")
-
-
-def _tell_clamps(frames: Sequence[FrameRow]) -> None:
-    """Say which photographs share a clamp, and which should and do not."""
-    shared = {frame.shared_clamp: frame.clamp_angle_sd_deg for frame in frames}
-    for run, sd_deg in shared.items():
-        if run:
-            count = sum(frame.shared_clamp == run for frame in frames)
-            typer.echo(
-                f"{run}: {count} photographs share one clamp, its direction is known "
-                f"to {sd_deg:.2f} deg"
-            )
-    moved = sum("clamp_moved" in frame.flags for frame in frames)
-    if moved:
-        typer.echo(
-            f"clamp_moved: {moved} photographs of one clamp disagree on its place or "
-            "direction; each keeps its own",
-            err=True,
-        )
-
-
-def _tell_frames(result: Any, *, json_output: bool) -> None:
-    if json_output:
-        print_json(
-            {
-                "out": str(result.out),
-                "measured": result.measured,
-                "failed": len(result.frames) - result.measured,
-                "frames": [
-                    {
-                        "image": frame.image,
-                        "status": frame.status,
-                        "flags": frame.flags,
-                        "length_mm": frame.length_mm,
-                        "tip_mm": frame.tip_mm,
-                        "tip_angle_deg": frame.tip_angle_deg,
-                        "width_mm": frame.width_mm,
-                        "clamp_angle_sd_deg": frame.clamp_angle_sd_deg,
-                        "shared_clamp": frame.shared_clamp,
-                        "reason": frame.reason,
-                    }
-                    for frame in result.frames
-                ],
-            }
-        )
-        return
-    for frame in result.frames:
-        if not frame.ok:
-            typer.echo(f"{frame.image}: failed: {frame.reason}", err=True)
-        elif doubts := [f for f in frame.flags if f not in _TOLD_ONCE]:
-            typer.echo(f"{frame.image}: {', '.join(doubts)}", err=True)
-    _tell_clamps(result.frames)
-    typer.echo(
-        f"{result.out}: {result.measured} of {len(result.frames)} photographs measured"
-    )

@@ -85,6 +85,9 @@ from .extraction.hints import (
 from .extraction.setting import (
     Setting as Setting,
 )
+from .extraction.setting import (
+    with_specimen as with_specimen,
+)
 from .measurement import (
     Measurement as Measurement,
 )

@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -251,3 +253,29 @@ def test_a_rod_above_the_camera_is_refused(magbend, calibration, tmp_path):
     assert code == 1
     assert "must be below the camera" in messages
     assert not (tmp_path / "out").exists()
+
+
+def test_a_specimen_is_known_from_its_file_or_from_the_run(
+    magbend, calibration, tmp_path
+):
+    rod = FIXTURES.parent / "specimens" / "gmc2.toml"
+    photo = FIXTURES / "rendered" / "dev_05.jpg"
+    code, _, messages = magbend(
+        "vision", "extract", photo, "--calibration", calibration, "--specimen", rod,
+        "--out", tmp_path / "given",
+    )  # fmt: skip
+    assert code == 0
+    assert "length_mismatch" in messages  # 28.5 mm long, and 30 by its file
+    run = tmp_path / "run"
+    (run / "images").mkdir(parents=True)
+    picture = cv2.imread(str(photo))
+    assert cv2.imwrite(str(run / "images" / "step_000.png"), picture)
+    specimen = tomllib.loads(rod.read_text(encoding="utf-8"))
+    (run / "run.json").write_text(json.dumps({"specimen": specimen}))
+    code, _, messages = magbend("vision", "extract", run, "--calibration", calibration)
+    assert code == 0
+    assert "length_mismatch" in messages
+    (row,) = read_frames(run / "frames.csv")
+    assert row.width_sd_mm < 0.02
+    assert "height_assumed" in row.flags
+    assert "--rod-height-mm" in messages

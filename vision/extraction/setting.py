@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.specimen import Specimen
 from ..camera.calibration import Calibration
 from ..camera.projection import LocalView, local_view
 from ..curve.curve import Curve
@@ -129,6 +130,24 @@ class Setting:
         """Return how the camera sees the rod's axis at points and angles in px."""
         seen: LocalView = local_view(camera.camera, points, theta, self.axis_height_mm)
         return seen
+
+
+def with_specimen(setting: Setting, specimen: Specimen) -> Setting:
+    """Return a setting that knows a specimen, where it does not say otherwise itself.
+
+    Parameters
+    ----------
+    setting : Setting
+        What is known already; it is kept.
+    specimen : Specimen
+        Tells side, length and joints.
+    """
+    return replace(
+        setting,
+        side_mm=setting.side_mm or specimen.side_mm,
+        length_mm=setting.length_mm or specimen.length_mm,
+        joints_mm=setting.joints_mm or specimen.joints_mm,
+    )
 
 
 def silhouette(view: LocalView) -> Array:

@@ -1,0 +1,136 @@
+"""What ``magbend vision`` prints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from .console import print_json
+
+if TYPE_CHECKING:
+    from ..vision import BatchResult, Calibration, FrameRow
+
+
+def calibration_facts(result: Calibration) -> dict[str, Any]:
+    """Return what is worth knowing of a calibration, for `--json` and for people."""
+    return {
+        "mm_per_px": result.mm_per_px(result.centre_px, height_mm=0.0),
+        "scale_relative_sd": result.scale_relative_sd,
+        "rms_px": result.rms_px,
+        "tilt_deg": result.tilt_deg,
+        "focal_px": result.focal_px[0],
+        "distortion": result.distortion,
+        "camera_height_mm": result.camera_height_mm,
+        "camera_height_sd_mm": result.camera_height_sd_mm,
+        "camera_height_source": result.camera_height_source,
+        "rod_height_mm": result.rod_height_mm,
+        "views": [
+            {
+                "name": view.name,
+                "rms_px": view.rms_px,
+                "corners": view.corners,
+                "used": view.used,
+                "why_not": view.why_not,
+            }
+            for view in result.views
+        ],
+    }
+
+
+def tell_calibration(result: Calibration, facts: dict[str, Any], out: Path) -> None:
+    """Print a calibration for people."""
+    for view in result.views:
+        verdict = "used" if view.used else f"dropped: {view.why_not}"
+        typer.echo(
+            f"{view.name}: {view.corners} corners, RMS {view.rms_px:.3f} px, {verdict}"
+        )
+    typer.echo(f"scale {facts['mm_per_px']:.7f} mm/px, tilt {result.tilt_deg:.2f} deg")
+    if math.isfinite(result.camera_height_sd_mm):
+        height, sd = result.camera_height_mm, result.camera_height_sd_mm
+        typer.echo(
+            f"camera {height:.0f} +- {sd:.0f} mm above the plane "
+            f"({result.camera_height_source}); per mm of height the scale shrinks by "
+            f"{100.0 / height:.3f} +- {100.0 * sd / height**2:.3f} %"
+        )
+        if sd > 0.3 * height:
+            typer.echo(
+                "The camera's height is hardly known. If the rod lies above the "
+                "board's plane, give --camera-height-mm or add tilted photographs."
+            )
+    else:
+        typer.echo(f"camera height {result.camera_height_source}")
+    typer.echo(f"{out}: written")
+
+
+_TOLD_ONCE = ("uncalibrated", "clamp_moved", "height_assumed")
+
+
+def _tell_clamps(frames: Sequence[FrameRow]) -> None:
+    """Say which photographs share a clamp, and which should and do not."""
+    shared = {frame.shared_clamp: frame.clamp_angle_sd_deg for frame in frames}
+    for run, sd_deg in shared.items():
+        if run:
+            count = sum(frame.shared_clamp == run for frame in frames)
+            typer.echo(
+                f"{run}: {count} photographs share one clamp, its direction is known "
+                f"to {sd_deg:.2f} deg"
+            )
+    moved = sum("clamp_moved" in frame.flags for frame in frames)
+    if moved:
+        typer.echo(
+            f"clamp_moved: {moved} photographs of one clamp disagree on its place or "
+            "direction; each keeps its own",
+            err=True,
+        )
+
+
+def tell_frames(result: BatchResult, *, json_output: bool) -> None:
+    """Print what came of the photographs: their doubts, and how many were measured."""
+    if json_output:
+        print_json(
+            {
+                "out": str(result.out),
+                "measured": result.measured,
+                "failed": len(result.frames) - result.measured,
+                "frames": [
+                    {
+                        "image": frame.image,
+                        "status": frame.status,
+                        "flags": frame.flags,
+                        "length_mm": frame.length_mm,
+                        "tip_mm": frame.tip_mm,
+                        "tip_angle_deg": frame.tip_angle_deg,
+                        "width_mm": frame.width_mm,
+                        "length_sd_mm": frame.length_sd_mm,
+                        "tip_sd_mm": frame.tip_sd_mm,
+                        "width_sd_mm": frame.width_sd_mm,
+                        "clamp_sd_mm": frame.clamp_sd_mm,
+                        "clamp_angle_sd_deg": frame.clamp_angle_sd_deg,
+                        "shared_clamp": frame.shared_clamp,
+                        "reason": frame.reason,
+                    }
+                    for frame in result.frames
+                ],
+            }
+        )
+        return
+    for frame in result.frames:
+        if not frame.ok:
+            typer.echo(f"{frame.image}: failed: {frame.reason}", err=True)
+        elif doubts := [f for f in frame.flags if f not in _TOLD_ONCE]:
+            typer.echo(f"{frame.image}: {', '.join(doubts)}", err=True)
+    _tell_clamps(result.frames)
+    if any("height_assumed" in frame.flags for frame in result.frames):
+        typer.echo(
+            "height_assumed: nobody said how high the rod's axis lies above the board; "
+            "0 mm is taken: give --rod-height-mm (half the rod's side, and what lies "
+            "under it), 0 if the board lay at its height",
+            err=True,
+        )
+    typer.echo(
+        f"{result.out}: {result.measured} of {len(result.frames)} photographs measured"
+    )
