@@ -13,7 +13,12 @@ import typer
 from ..core.errors import InputError
 from . import vision_points
 from .console import JSON, group, print_json, progress
-from .vision_show import calibration_facts, tell_calibration, tell_frames
+from .vision_show import (
+    calibration_facts,
+    tell_calibration,
+    tell_frames,
+    tell_ringing,
+)
 
 if TYPE_CHECKING:
     from ..core import Specimen
@@ -263,6 +268,47 @@ def extract(
         index = next(i for i, frame in enumerate(result.frames) if frame.ok)
         figure_of_steps(read_source(sources[index]), setting, figure_steps)
     tell_frames(result, json_output=json_output)
+
+
+@app.command(
+    epilog="Example: magbend vision ring release.mp4 --calibration calibration.json "
+    "--rod-height-mm 0.9 --fps 240"
+)
+def ring(
+    film: Path = typer.Argument(..., help="A film from before the rod is let go."),
+    calibration: Path = typer.Option(
+        ..., "--calibration", help="From `vision calibrate`, at the film's size."
+    ),
+    rod_height_mm: float = typer.Option(
+        None, "--rod-height-mm", help="Height of the rod's axis above the board."
+    ),
+    fps: float = typer.Option(
+        None, "--fps", help="Frames per second as taken, if the file says another."
+    ),
+    settle_mm: float = typer.Option(
+        0.05, "--settle-mm", help="Amplitude of the tip that counts as settled."
+    ),
+    specimen: Path = typer.Option(None, "--specimen", help="The rod (TOML)."),
+    json_output: bool = JSON,
+) -> None:
+    """Measure frequency, damping and settling time of a rod's vibration."""
+    from dataclasses import asdict
+
+    from ..core.checks import positive
+    from ..vision import ring_of_film, with_specimen
+
+    positive(settle_mm, "--settle-mm", "mm")
+    setting = _setting(calibration, None, {"rod_height_mm": rod_height_mm})
+    if (rod := _specimen(specimen, None)) is not None:
+        setting = with_specimen(setting, rod)
+    with progress("frames") as report:
+        found = ring_of_film(
+            film, setting, fps=fps, settle_mm=settle_mm, progress=report
+        )
+    if json_output:
+        print_json({"film": str(film), **asdict(found)})
+    else:
+        tell_ringing(found, settle_mm)
 
 
 def _two_numbers(text: str, option: str) -> tuple[int, int]:

@@ -12,7 +12,7 @@ import typer
 from .console import print_json
 
 if TYPE_CHECKING:
-    from ..vision import BatchResult, Calibration, FrameRow
+    from ..vision import BatchResult, Calibration, FrameRow, Ringing
 
 
 def calibration_facts(result: Calibration) -> dict[str, Any]:
@@ -133,4 +133,21 @@ def tell_frames(result: BatchResult, *, json_output: bool) -> None:
         )
     typer.echo(
         f"{result.out}: {result.measured} of {len(result.frames)} photographs measured"
+    )
+
+
+def tell_ringing(found: Ringing, settle_mm: float) -> None:
+    """Print a vibration for people."""
+    typer.echo(
+        f"frequency {found.frequency_Hz:.3f} +- {found.frequency_sd_Hz:.3f} Hz, "
+        f"damping ratio {found.damping_ratio:.4f} +- {found.damping_ratio_sd:.4f}"
+    )
+    settled = (
+        f"below {settle_mm:g} mm {found.settle_s:.2f} s later"
+        if math.isfinite(found.settle_s)
+        else "it does not die away"
+    )
+    typer.echo(
+        f"amplitude {found.amplitude_mm:.3f} mm at {found.first_s:.3f} s; {settled} "
+        f"({found.frames} frames, {found.residual_mm:.3f} mm left)"
     )

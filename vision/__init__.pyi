@@ -4,6 +4,9 @@ from .batch.figures import (
 from .batch.figures import (
     figure_of_steps as figure_of_steps,
 )
+from .batch.film import (
+    ring_of_film as ring_of_film,
+)
 from .batch.inputs import (
     list_sources as list_sources,
 )
@@ -81,6 +84,12 @@ from .extraction.hints import (
 )
 from .extraction.hints import (
     measure_hinted as measure_hinted,
+)
+from .extraction.ring import (
+    Ringing as Ringing,
+)
+from .extraction.ring import (
+    ring_down as ring_down,
 )
 from .extraction.setting import (
     Setting as Setting,

@@ -63,6 +63,12 @@ class Source:
     overlay: str = ""
     run: Path | None = None
 
+    def follows(self, other: Source) -> bool:
+        """Whether this is the next frame of the same film."""
+        if self.frame is None or other.frame is None:
+            return False
+        return self.path == other.path and self.frame == other.frame + 1
+
 
 def list_sources(paths: Iterable[Path]) -> list[Source]:
     """Return every picture that the user's paths mean, in their order.

@@ -1,0 +1,97 @@
+"""A film of a rod, followed from frame to frame."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from ...core.checks import positive
+from ...core.errors import VisionError
+from ...core.progress import Progress, silent
+from ..extraction.follow import follow
+from ..extraction.ring import Ringing, ring_down
+from ..extraction.setting import Setting
+from ..measurement import Measurement
+from ..picture.photo import Photo, as_photo, refuse_special
+
+
+def read_film(path: Path) -> tuple[float, int, Iterator[Photo]]:
+    """Open a film.
+
+    Returns
+    -------
+    fps : float
+        Frames per second by the file; 0 where it does not say.
+    count : int
+        How many frames it promises.
+    frames : iterator of Photo
+        One after the other, until the film ends or cannot be decoded any more.
+
+    Raises
+    ------
+    VisionError
+        If there is no such film, or it cannot be opened.
+    """
+    if not path.exists():
+        raise VisionError(f"{path}: there is no such file")
+    refuse_special(path)
+    film = cv2.VideoCapture(str(path))
+    if not film.isOpened():
+        raise VisionError(f"{path.name}: this video cannot be opened or has no frames")
+    fps, count = film.get(cv2.CAP_PROP_FPS), film.get(cv2.CAP_PROP_FRAME_COUNT)
+
+    def frames() -> Iterator[Photo]:
+        try:
+            while True:
+                found, pixels = film.read()
+                if not found:
+                    return
+                yield as_photo(np.asarray(pixels), source=path.name)
+        finally:
+            film.release()
+
+    return float(fps) if fps and np.isfinite(fps) else 0.0, int(count), frames()
+
+
+def ring_of_film(
+    path: Path, setting: Setting, *, fps: float | None = None, settle_mm: float = 0.05,
+    progress: Progress = silent,
+) -> Ringing:  # fmt: skip
+    """Return how the tip of a rod rings in a film that begins before it is let go.
+
+    Parameters
+    ----------
+    path : Path
+        The film.
+    setting : Setting
+        What is known; it needs a calibration.
+    fps : float, optional
+        Frames per second when it was taken, if the file says another rate (slow
+        motion) or none.
+    settle_mm : float
+        Amplitude that counts as settled.
+    progress : callable
+        Called as ``progress(done, total)``.
+
+    Raises
+    ------
+    VisionError
+        If the film cannot be read, has no rate, or shows no vibration.
+    """
+    if setting.calibration is None:
+        raise VisionError("a vibration is measured in mm: give a calibration")
+    told, count, frames = read_film(path)
+    rate = told if fps is None else positive(fps, "fps", "frames/s")
+    if not rate > 0.0:
+        raise VisionError(f"{path.name}: does not say its frames per second: give them")
+    tips: list[tuple[float, float]] = []
+    last: Measurement | None = None
+    for number, photo in enumerate(frames, start=1):
+        last = follow(photo, setting, last)
+        tips.append(last.tip_mm)
+        progress(number, max(count, number))
+    time_s = np.arange(len(tips)) / rate
+    return ring_down(time_s, np.reshape(tips, (-1, 2)), settle_mm=settle_mm)
