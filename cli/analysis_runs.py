@@ -28,6 +28,9 @@ _GRAVITY = typer.Option(
     "0 0 -9.81 is a bench seen from above.",
 )
 _LOAD = typer.Option(1.0, "--load-factor", help="Factor on the magnetic load.")
+_UNVERIFIED = typer.Option(
+    False, "--unverified", help="Go on with runs whose files were altered; say which."
+)
 
 
 def register(app: typer.Typer) -> None:
@@ -53,13 +56,14 @@ def compare(
     clamp_angle_deg: float = _CLAMP,
     gravity_m_s2: tuple[float, float, float] = _GRAVITY,
     load_factor: float = _LOAD,
+    unverified: bool = _UNVERIFIED,
     json: bool = JSON,
 ) -> None:
     """Compare measured with simulated centrelines; write comparison.csv."""
     from ..analysis.compare.compare import check_any, comparison_table, write_comparison
 
     _choice(model, ("rod", "solid"), "--model")
-    loaded, left_out = _loaded(runs)
+    loaded, left_out = _loaded(runs, unverified=unverified)
     _outputs(out, *(run.path / "comparison.csv" for run in loaded))
     done = _compared(
         loaded, left_out, model, clamp_angle_deg, gravity_m_s2, load_factor
@@ -119,6 +123,7 @@ def fit(
     clamp_angle_deg: float = _CLAMP,
     gravity_m_s2: tuple[float, float, float] = _GRAVITY,
     load_factor: float = _LOAD,
+    unverified: bool = _UNVERIFIED,
     json: bool = JSON,
 ) -> None:
     """Fit the moduli with uncertainties; write fit.json."""
@@ -130,6 +135,7 @@ def fit(
         write_fit,
     )
     from ..analysis.paper.probe import from_probe_reading
+    from ..core.derived import note_derived
     from ..sim import Support
 
     _choice(field, ("magnet", "uniform"), "--field")
@@ -139,7 +145,7 @@ def fit(
     nuisance = _nuisance(hold, prior)
     if posterior:
         check_installed()
-    loaded, left_out = _loaded(runs)
+    loaded, left_out = _loaded(runs, unverified=unverified)
     path = out or loaded[0].path / "fit.json"
     _outputs(path)
     if probe_standoff_mm is not None:
@@ -162,6 +168,8 @@ def fit(
                 result, steps=posterior, seed=seed, progress=tell
             )
     write_fit(path, result, sampled)
+    used = [file for run in loaded for file in run.files]
+    note_derived([path], sources=used, command="analysis fit")
     data = result.as_dict()
     if sampled is not None:
         data["posterior"] = sampled.as_dict()
@@ -183,6 +191,7 @@ def report(
     clamp_angle_deg: float = _CLAMP,
     gravity_m_s2: tuple[float, float, float] = _GRAVITY,
     load_factor: float = _LOAD,
+    unverified: bool = _UNVERIFIED,
     json: bool = JSON,
 ) -> None:
     """Write one self-contained HTML page, with the figures as PDF beside it."""
@@ -192,7 +201,7 @@ def report(
     from ..analysis.report.figures import gmc_numbers
 
     _choice(model, ("rod", "solid"), "--model")
-    loaded, left_out = _loaded(runs)
+    loaded, left_out = _loaded(runs, unverified=unverified)
     path = out or (
         loaded[0].path / "report.html" if len(loaded) == 1 else Path("report.html")
     )
@@ -241,11 +250,12 @@ def export(
         "--out",
         help="NAME.mat, NAME.parquet, NAME.csv, or a folder for all three.",
     ),
+    unverified: bool = _UNVERIFIED,
 ) -> None:
     """Export points, steps and comparisons as CSV, Parquet or MATLAB .mat."""
     from ..analysis.compare.export import check_export, export_runs
 
-    loaded, left_out = _loaded(runs)
+    loaded, left_out = _loaded(runs, unverified=unverified)
     check_export(out)
     done = _compared(loaded, left_out, "rod")
     for path in export_runs(done, out):
@@ -334,11 +344,13 @@ def probe(
         typer.echo(line)
 
 
-def _loaded(paths: Sequence[Path]) -> tuple[list[RunData], list[str]]:
+def _loaded(
+    paths: Sequence[Path], *, unverified: bool
+) -> tuple[list[RunData], list[str]]:
     """Return the runs that can be read, and a sentence on each that cannot."""
     from ..analysis.runs.load import load_runs
 
-    loaded, left_out = load_runs(paths)
+    loaded, left_out = load_runs(paths, unverified=unverified)
     for run in loaded:
         for warning in run.warnings:
             typer.echo(f"{run.label}: {warning}", err=True)
@@ -382,10 +394,14 @@ def _tell_left_out(left_out: Sequence[str], kept: int) -> None:
 def _outputs(*paths: Path | None) -> None:
     """Refuse what cannot be written, before the work."""
     from ..core.files import output_file
+    from ..core.owned import refuse_links
+    from ..rig import is_run
 
     for path in paths:
         if path is not None:
             output_file(path)
+            if is_run(path.parent):
+                refuse_links(path.parent)
 
 
 def _support(

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from ..core.errors import StoreError
 from .keys import answering
 
 if TYPE_CHECKING:
@@ -70,14 +69,14 @@ def open_bench(
     control: RunControl | None = None,
     speed: float | None = None,
 ) -> Iterator[Devices]:
-    """Yield open devices; every byte of theirs goes to ``wire.log`` in `folder`.
+    """Yield open devices; every byte of theirs is for ``wire.log``.
 
     Parameters
     ----------
     plan : Plan
         The plan with its rig.
     folder : Path
-        Run folder; made if missing.
+        Run folder; owned meanwhile, made if missing.
     readings_mT : dict or None
         Typed readings per gap that replace the meter.
     twin_seed : int or None
@@ -90,29 +89,30 @@ def open_bench(
     speed : float, optional
         Of the computed bench's clock over the wall's; by default it only steps.
     """
-    from ..rig import WireLog, open_devices, stopping
+    from ..core.owned import owning_folder
+    from ..rig import WireLog, is_run, open_devices, stopping
 
     clock = _clock(twin_seed, speed)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        log = WireLog(folder / "wire.log", clock)
-    except OSError as error:
-        raise StoreError(f"{folder}: cannot be written: {error.strerror}") from None
-    with contextlib.closing(log), _owner(plan, twin_seed, control) as owner:
+    kind, command = ("run", "rig run") if camera else ("scan", "rig scan-field")
+    with (
+        owning_folder(folder, kind, command, ours=is_run),
+        contextlib.closing(WireLog(None, clock)) as log,
+        _owner(plan, twin_seed, control) as owner,
+    ):
         if twin_seed is None:
             devices = open_devices(
                 plan, clock, log=log, readings_mT=readings_mT, with_camera=camera,
                 ask=ask_flux if asks_flux(plan, readings_mT) else None,
             )  # fmt: skip
         else:
-            from ..analysis.twin.run import open_twin_bench, photograph_board
+            from ..analysis.twin.run import keep_board, open_twin_bench
 
             bench, devices = open_twin_bench(plan, seed=twin_seed, clock=clock, log=log)
         owner.commands["stop"] = stopping(devices.stage)
         with contextlib.closing(devices):
             yield devices
         if twin_seed is not None and camera:
-            photograph_board(bench, folder / "board.png")
+            keep_board(bench, folder)
 
 
 def _clock(twin_seed: int | None, speed: float | None) -> Clock:

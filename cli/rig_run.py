@@ -111,29 +111,39 @@ def verify(
     run: Annotated[Path, typer.Argument(help="Run folder.")],
     as_json: Json = False,
 ) -> None:
-    """Check that a run is whole and unaltered."""
-    from ..rig.runs.read import read_run
-    from ..rig.runs.verify import verify_run
+    """Check that a run is whole and unaltered.
 
-    problems = verify_run(run)
-    record = None if problems else read_run(run)
+    Every file of the folder is good, altered, missing, extra, or made from an older
+    input; and the steps are as the plan says.
+    """
+    from dataclasses import asdict
+
+    from ..rig import check_run
+
+    check = check_run(run)
+    record = check.run
     if as_json:
         print_json(
             {
                 "run": str(run),
-                "problems": problems,
+                "problems": check.problems,
                 "status": record.status if record else None,
                 "steps": len(record.steps) if record else None,
+                "schema": record.schema if record else None,
+                "files": [asdict(one) for one in check.files],
             }
         )
     else:
-        for problem in problems:
+        for problem in check.problems:
             typer.echo(problem)
         for warning in record.warnings if record else ():
             typer.echo(f"{run}: {warning}", err=True)
-        if record:
-            typer.echo(f"{run}: good, {len(record.steps)} steps, {record.status}")
-    if problems:
+        if record and not check.problems:
+            typer.echo(
+                f"{run}: good, {len(record.steps)} steps, {record.status}, "
+                f"{len(check.files)} files"
+            )
+    if check.problems:
         raise typer.Exit(1)
 
 

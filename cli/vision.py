@@ -114,6 +114,7 @@ def calibrate(
     json_output: bool = JSON,
 ) -> None:  # fmt: skip
     """Calibrate a camera from photographs of the board."""
+    from ..core.derived import note_derived
     from ..core.files import output_file
     from ..vision import calibrate as calibrate_photos
     from ..vision import read_photo, write_calibration
@@ -142,6 +143,7 @@ def calibrate(
             focal_px=focal_px,
         )
     write_calibration(result, out)
+    note_derived([out], sources=[plane, *(lens or [])], command="vision calibrate")
     facts = calibration_facts(result)
     if json_output:
         print_json({"calibration": str(out), **facts})
@@ -218,7 +220,7 @@ def extract(
     json_output: bool = JSON,
 ) -> None:  # fmt: skip
     """Measure the rod's centreline in photographs."""
-    from ..core.files import output_file, output_folder
+    from ..core.files import output_file
     from ..vision import extract_files, figure_kind, list_sources, with_specimen
 
     if figure_steps is not None:
@@ -248,7 +250,6 @@ def extract(
     for path in (edges, figure_steps):
         if path is not None:
             output_file(path)
-    output_folder(folder)
     kept = f"{folder} holds what was measured; --resume goes on from there"
     with progress("photographs", kept=kept) as report:
         result = extract_files(
@@ -260,6 +261,7 @@ def extract(
             workers=workers or _workers(len(sources)),
             resume=resume,
             shared_clamp=shared_clamp,
+            made_with=[path for path in (calibration, bare) if path is not None],
             progress=report,
         )
     if figure_steps is not None:

@@ -23,7 +23,7 @@ from .seal import is_whole, sealed
 MANIFEST_FILE = "manifest.json"
 SCHEMA = 1
 
-FileStatus = Literal["good", "altered", "missing", "extra", "older input"]
+FileStatus = Literal["good", "torn", "altered", "missing", "extra", "older input"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,6 +33,11 @@ class FileFinding:
     name: str
     status: FileStatus
     detail: str = ""
+
+    @property
+    def is_problem(self) -> bool:
+        """Whether it is more than a last line that a power cut tore."""
+        return self.status not in ("good", "torn")
 
     @property
     def sentence(self) -> str:

@@ -22,7 +22,7 @@ from typing import Any
 from .door import read_file
 from .errors import InputError, StoreError
 from .files import output_folder, write_text
-from .json import parse_json, write_json
+from .json import parse_json
 from .seal import is_whole, sealed
 
 MARK = ".magbend"
@@ -142,12 +142,18 @@ def _make(folder: Path, ours: Callable[[Path], bool]) -> bool:
             f"{folder}: is not empty and was not made by magbend; name a folder that "
             f"is new or empty"
         )
-    _refuse_links(folder)
+    refuse_links(folder)
     return False
 
 
-def _refuse_links(folder: Path) -> None:
-    """Refuse a folder through whose links one would write somewhere else."""
+def refuse_links(folder: Path) -> None:
+    """Refuse a folder through whose links one would write somewhere else.
+
+    Raises
+    ------
+    StoreError
+        If it holds a link that leaves it.
+    """
     real = folder.resolve()
     for count, (at, folders, files) in enumerate(os.walk(folder)):
         for name in (*folders, *files):
@@ -190,7 +196,7 @@ def _introduce(mark: Path, kind: str, command: str) -> None:
         facts = {"schema": SCHEMA, "kind": kind, "made_by": program()}
         text = sealed({**facts, "made_utc": _now()}, indent=1)
         write_text(mark / FOLDER_FILE, text)
-    write_json(mark / HOLDER_FILE, _me(command))
+    write_text(mark / HOLDER_FILE, sealed(_me(command), indent=1))
 
 
 def _me(command: str) -> dict[str, Any]:
@@ -213,6 +219,21 @@ def _holder(mark: Path) -> str:
         )
     except (ValueError, KeyError, TypeError, StoreError):
         return "is being written by another process; wait until it is done"
+
+
+def altered_marks(folder: Path) -> list[str]:
+    """Return the names of marks of a folder that are not as they were written."""
+    mark = folder / MARK
+    names = []
+    for path in sorted(mark.iterdir()) if mark.is_dir() else ():
+        try:
+            data = read_file(path, 0.1, StoreError)
+            is_good = data == b"" if path.name == LOCK_FILE else is_whole(data)
+        except StoreError:
+            is_good = False
+        if not is_good:
+            names.append(f"{MARK}/{path.name}")
+    return names
 
 
 def _remove_if_empty(folder: Path) -> None:

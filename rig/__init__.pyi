@@ -59,9 +59,6 @@ from .errors import NotStoppedError as NotStoppedError
 from .errors import PositionLostError as PositionLostError
 from .errors import StageTimeoutError as StageTimeoutError
 from .errors import StoppedError as StoppedError
-from .link import (
-    WireLog as WireLog,
-)
 from .meter.description import (
     ready_meters as ready_meters,
 )
@@ -82,6 +79,9 @@ from .runs.read import (
     Run as Run,
 )
 from .runs.read import (
+    is_run as is_run,
+)
+from .runs.read import (
     read_run as read_run,
 )
 from .runs.runner import (
@@ -89,6 +89,15 @@ from .runs.runner import (
 )
 from .runs.runner import (
     run as run,
+)
+from .runs.verify import (
+    RunCheck as RunCheck,
+)
+from .runs.verify import (
+    check_run as check_run,
+)
+from .runs.verify import (
+    check_used as check_used,
 )
 from .runs.verify import (
     verify_run as verify_run,
@@ -121,3 +130,4 @@ from .stage.protocol import (
     Stage as Stage,
 )
 from .stage.stop_request import stopping as stopping
+from .wire_log import WireLog as WireLog

@@ -9,53 +9,16 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from ..core.errors import StageError
 from .clock import Clock
 from .errors import LinkLostError
-from .ports import (
-    check_port,
-    register_twin_urls,
-    why_not_open,
-)
+from .ports import check_port, register_twin_urls, why_not_open
+from .wire_log import WireLog
 
 _SLICE_S = 0.02
 _MAX_LINE = 4096
-
-
-class WireLog:
-    """A text file of every byte to and from the devices, with times.
-
-    Each row is ``monotonic_s utc device direction bytes``; direction is ``>>`` to the
-    device, ``<<`` from it and ``--`` a remark; bytes are a Python literal.
-
-    Parameters
-    ----------
-    path : Path
-        Where to append.
-    clock : Clock
-        Source of both times.
-    """
-
-    def __init__(self, path: Path, clock: Clock) -> None:
-        self._clock = clock
-        self._lock = threading.Lock()
-        self._file: TextIO = path.open("a", encoding="utf-8", buffering=1)
-
-    def record(self, device: str, direction: str, data: bytes | str) -> None:
-        """Append one row; a closed or full log never stops the stage."""
-        utc = self._clock.utc().isoformat(timespec="milliseconds")
-        what = data if isinstance(data, str) else repr(data)
-        row = f"{self._clock.monotonic_s():.3f} {utc} {device} {direction} {what}\n"
-        with self._lock, contextlib.suppress(OSError, ValueError):
-            self._file.write(row)
-
-    def close(self) -> None:
-        """Close the file."""
-        with self._lock, contextlib.suppress(OSError):
-            self._file.close()
 
 
 class Link:

@@ -17,6 +17,7 @@ import numpy as np
 
 from ... import sim
 from ...core.centreline import Centreline
+from ...core.derived import note_derived
 from ...core.errors import InputError, StoreError
 from ...core.files import write_text
 from ...core.magnet import Magnet
@@ -432,7 +433,10 @@ def comparison_table(runs: Iterable[RunComparison]) -> pd.DataFrame:
 
 def write_comparison(path: Path, runs: Iterable[RunComparison]) -> None:
     """Write ``comparison.csv``, whole or not at all; empty cells where no number is."""
+    runs = list(runs)
     write_text(path, comparison_table(runs).to_csv(index=False, lineterminator="\n"))
+    used = [file for run in runs for file in run.run.files]
+    note_derived([path], sources=used, command="analysis compare")
 
 
 def check_any(runs: Sequence[RunComparison]) -> None:

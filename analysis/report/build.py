@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...core.derived import note_derived
 from ...core.errors import MagbendError, StoreError
 from ...core.files import write_bytes, write_text
 from ...core.progress import Progress, silent
@@ -125,6 +126,8 @@ def write_report(
         write_bytes(drawing.folder / name, data)
     write_text(out, page)
     pdfs = tuple(drawing.folder / name for name in drawing.pdfs)
+    used = [file for run in runs for file in run.run.files]
+    note_derived([out, *pdfs], sources=used, command="analysis report")
     return ReportFiles(html=out, figures=pdfs)
 
 

@@ -22,8 +22,8 @@ from ...core.errors import ConfigError, InputError, StoreError
 from ...core.magnet import Magnet
 from ...core.specimen import Specimen
 from ...core.specimen_file import MagnetModel, SpecimenModel
+from ...rig import Run, check_used, read_run
 from ...rig.bench.config import BenchModel
-from ...rig.runs.read import read_run
 from ...sim import Support
 from ...vision import (
     Calibration,
@@ -37,6 +37,9 @@ from .imported import read_imported
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_MEASURED = ("frames.csv", "centrelines.csv", "calibration.json")
+_FILES = ("run.json", "steps.jsonl", "end.json", *_MEASURED)
 
 POINT_COLUMNS = (
     "s_mm", "x_mm", "y_mm", "theta_rad", "kappa_per_mm", "width_mm", "sigma_mm",
@@ -225,6 +228,11 @@ class RunData:
             return pd.DataFrame(columns=list(names))
         return pd.concat(tables, ignore_index=True)
 
+    @property
+    def files(self) -> list[Path]:
+        """The files that were read, for those who note what a result was made from."""
+        return [path for name in _FILES if (path := self.path / name).is_file()]
+
     def frame(self, step: Step) -> Frame | None:
         """Return what was found in the photograph of `step`, None if not looked at."""
         return self.frames.get(step.image)
@@ -256,8 +264,12 @@ def find_runs(paths: Iterable[Path]) -> list[Path]:
     return list(dict.fromkeys(runs))
 
 
-def load_runs(paths: Iterable[Path]) -> tuple[list[RunData], list[str]]:
+def load_runs(
+    paths: Iterable[Path], *, unverified: bool = False
+) -> tuple[list[RunData], list[str]]:
     """Read the runs among `paths`, and those directly inside them.
+
+    `unverified` goes on where a run does not hold (see `load_run`).
 
     Returns
     -------
@@ -274,7 +286,7 @@ def load_runs(paths: Iterable[Path]) -> tuple[list[RunData], list[str]]:
     runs, left_out = [], []
     for path in find_runs(paths):
         try:
-            runs.append(load_run(path))
+            runs.append(load_run(path, unverified=unverified))
         except StoreError as error:
             left_out.append(str(error))
     if not runs:
@@ -282,23 +294,28 @@ def load_runs(paths: Iterable[Path]) -> tuple[list[RunData], list[str]]:
     return runs, left_out
 
 
-def load_run(path: Path | str) -> RunData:
+def load_run(path: Path | str, *, unverified: bool = False) -> RunData:
     """Read a run folder and the centrelines measured from its photographs.
+
+    Its records, photographs and tables are held against their digests first.
 
     Parameters
     ----------
     path : Path
         A folder with ``run.json``, ``steps.jsonl``, ``frames.csv`` and
         ``centrelines.csv``; ``calibration.json`` and ``end.json`` if there are any.
+    unverified : bool
+        Go on where a file does not hold what was written: a warning says which.
 
     Raises
     ------
     StoreError
-        If a file is missing, torn beyond use or does not hold what it should: one
+        If a file was altered or its inputs were, is missing, torn beyond use or does not hold what it should: one
         sentence with the command that makes it.
     """
     stored = read_run(Path(path))
     path, record, warnings = stored.path, stored.manifest, list(stored.warnings)
+    warnings += _unproved(stored, unverified=unverified)
     try:
         specimen = SpecimenModel.model_validate(record.get("specimen")).specimen()
         magnet = _magnet(record)
@@ -340,6 +357,20 @@ def load_run(path: Path | str) -> RunData:
         end=end,
         warnings=tuple(warnings),
     )
+
+
+def _unproved(run: Run, *, unverified: bool) -> list[str]:
+    """Return what does not hold of the files that are read; refuse it unless told."""
+    photographs = [file["path"] for step in run.steps for file in step["files"]]
+    found = check_used(run, [*_MEASURED, *photographs])
+    broken = [one.sentence for one in found if one.status not in ("extra", "missing")]
+    if broken and not unverified:
+        more = f", and {len(broken) - 1} more" if len(broken) > 1 else ""
+        raise StoreError(
+            f"{run.path}: {broken[0]}{more}; magbend rig verify {run.path} says all, "
+            f"--unverified goes on"
+        )
+    return [one.sentence for one in found if one.status != "missing"]
 
 
 def _first_line(error: Exception) -> str:

@@ -12,17 +12,19 @@ from typing import Any
 import cv2
 import numpy as np
 
+from ...core.derived import note_derived
 from ...core.errors import ConfigError, RigError, VisionError
 from ...core.files import write_bytes, write_text
+from ...core.owned import owning_folder
 from ...core.specimen import Specimen
 from ...core.specimen_file import specimen_dict
 from ...rig.bench.config import Plan, read_plan
 from ...rig.bench.devices import Devices, closing_all
 from ...rig.bench.template import write_templates
 from ...rig.clock import Clock, SteppedClock
-from ...rig.link import WireLog
 from ...rig.runs.runner import RunSummary, run
 from ...rig.virtual.bench import open_twin
+from ...rig.wire_log import WireLog
 from ...vision import (
     Calibration,
     Setting,
@@ -101,9 +103,11 @@ def run_on_twin(
     RigError
         If the run did not end with success.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     clock = SteppedClock()
-    with contextlib.closing(WireLog(folder / "wire.log", clock)) as log:
+    with (
+        owning_folder(folder, "run", "rig run"),
+        contextlib.closing(WireLog(None, clock)) as log,
+    ):
         bench, devices = open_twin_bench(
             plan, seed=seed, clock=clock, log=log, truth=truth
         )
@@ -125,14 +129,23 @@ def photograph_board(bench: TwinBench, path: Path) -> None:
     write_bytes(path, np.asarray(png).tobytes())
 
 
+def keep_board(bench: TwinBench, folder: Path) -> None:
+    """Write the picture of the board into a run folder, and note what made it."""
+    path = folder / "board.png"
+    photograph_board(bench, path)
+    note_derived([path], sources=[folder / "run.json"], command="rig run --twin")
+
+
 def calibrate_twin(bench: TwinBench, folder: Path) -> Calibration:
     """Photograph the twin's board and calibrate the run in `folder` with it."""
     path = folder / "board.png"
-    photograph_board(bench, path)
+    keep_board(bench, folder)
     calibration = calibrate(
         read_photo(path), board=bench.board, rod_height_mm=bench.axis_height_mm
     )
-    write_calibration(calibration, folder / "calibration.json")
+    out = folder / "calibration.json"
+    write_calibration(calibration, out)
+    note_derived([out], sources=[path], command="vision calibrate")
     return calibration
 
 

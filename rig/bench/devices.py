@@ -12,18 +12,23 @@ from ..camera.protocol import Camera
 from ..clock import Clock
 from ..meter.protocol import Meter
 from ..stage.gap import GapStage
+from ..wire_log import WireLog
 
 logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Devices:
-    """An open stage, camera and Tesla-meter, and the clock that they share."""
+    """An open stage, camera and Tesla-meter, and the clock that they share.
+
+    `log`, where there is one, waits for a folder that somebody owns.
+    """
 
     stage: GapStage
     camera: Camera
     meter: Meter
     clock: Clock
+    log: WireLog | None = None
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -11,10 +11,10 @@ from ..camera.capture import CaptureCamera, Source
 from ..camera.config import CameraConfig
 from ..camera.protocol import Camera, NoCamera
 from ..clock import Clock
-from ..link import WireLog
 from ..meter.config import MeterConfig
 from ..meter.protocol import Ask, ManualMeter, Meter, NoMeter
 from ..stage.gap import GapStage
+from ..wire_log import WireLog
 from .config import Plan, RigModel
 from .devices import Devices
 
@@ -232,4 +232,4 @@ def open_devices(
         if with_camera:
             camera = open_camera(plan.rig.camera, folder, clock)
         opened.pop_all()
-    return Devices(stage=stage, camera=camera, meter=meter, clock=clock)
+    return Devices(stage=stage, camera=camera, meter=meter, clock=clock, log=log)

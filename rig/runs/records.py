@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any
 
 RUN_FILE = "run.json"
@@ -19,7 +18,8 @@ END_FILE = "end.json"
 SESSIONS_FILE = "sessions.jsonl"
 WIRE_FILE = "wire.log"
 IMAGES = "images"
-SCHEMA = 1
+SCHEMA = 2
+"""1: until 0.1. 2: records carry seals, lines are chained (``magbend migrate``)."""
 
 Record = dict[str, Any]
 """One JSON object: a step, a session, the manifest."""
@@ -33,18 +33,6 @@ def utc_now() -> str:
 def sha256_of(data: bytes) -> str:
     """Return the SHA-256 of `data` as 64 hexadecimal digits."""
     return hashlib.sha256(data).hexdigest()
-
-
-def sha256_of_file(path: Path) -> str:
-    """Return the SHA-256 of a file, read in pieces.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    """
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def image_name(index: int) -> str:

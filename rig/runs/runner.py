@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from ...core.errors import MagbendError, RigError, StageError
+from ...core.owned import owning_folder
 from ...core.progress import Progress, silent
 from ..bench.config import Plan
 from ..bench.devices import Devices
@@ -112,14 +113,17 @@ def run(
     """
     for gap_mm in plan.gaps_mm:
         devices.stage.check_gap(gap_mm)
-    with interrupts(devices.stage.request_stop) as received:
+    with (
+        owning_folder(out, "run", "rig run", ours=is_run),
+        interrupts(devices.stage.request_stop) as received,
+    ):
         manifest = make_manifest(plan, devices, twin=twin)
         is_resumed = resume and is_run(out)
         if is_resumed:
             require_same(read_run(out).manifest, manifest)
-            folder = RunFolder.reopen(out)
+            folder = RunFolder.reopen(out, devices.log)
         else:
-            folder = RunFolder.create(out, manifest, plan.text)
+            folder = RunFolder.create(out, manifest, plan.text, devices.log)
         control = control or RunControl()
         _introduce(control, plan, out)
         session = _Session(plan, devices, folder, control, report, received)
@@ -170,8 +174,7 @@ class _Session:
         except BaseException as error:
             self._end("fail", f"internal error: {type(error).__name__}: {error}")
             raise
-        reason = self._end(status, reason)
-        return status, reason
+        return self._end(status, reason)
 
     def _prepare(self, is_resumed: bool) -> None:
         stage = self.devices.stage
@@ -293,7 +296,7 @@ class _Session:
                 f"recorded: look at the stage, then go on with --resume"
             )
 
-    def _end(self, status: str, reason: str) -> str:
+    def _end(self, status: str, reason: str) -> tuple[str, str]:
         """Bring the stage to a stand and write the ending, whatever happens."""
         stage = self.devices.stage
         if status != "success" or stage.stop_requested():
@@ -301,7 +304,8 @@ class _Session:
             if status == "abort" and stage.last_stop is not None:
                 reason = f"{reason}: {stage.last_stop.sentence()}"
         try:
-            self.folder.finish(status, reason)
+            end = self.folder.finish(status, reason)
+            status, reason = end["status"], end["reason"]
         except MagbendError as error:
             # The disk refuses: the missing ending marks the run as cut off.
             logger.warning("%s", error)
@@ -312,7 +316,7 @@ class _Session:
             self._say("retracting", "retracting from the magnet")
             with _best_effort("retracting"), contextlib.suppress(KeyboardInterrupt):
                 stage.abort("retract")
-        return reason
+        return status, reason
 
     def _halt(self) -> None:
         """Hold the stage; a further Ctrl-C stops it at once, one more gives that up."""

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from ...core.errors import RigError, StoreError
 from ...core.files import write_text
+from ...core.owned import owning_folder
 from ...core.progress import Progress, silent
 from ..bench.devices import Devices
 from ..clock import Check, wait
@@ -16,8 +17,11 @@ from ..errors import StoppedError
 from ..interrupts import interrupts
 from ..meter.protocol import Flux
 from ..stage.gap import GapStage
+from ..wire_log import WireLog
 from .control import Report, quiet
+from .records import WIRE_FILE
 
+TABLE = "field.csv"
 COLUMNS = "gap_mm,flux_mT,sd_mT,n"
 _COLUMNS_WITHOUT_SD = "gap_mm,flux_mT,n"
 
@@ -87,10 +91,13 @@ def scan_field(
     stage = devices.stage
     for gap_mm in gaps_mm:
         stage.check_gap(gap_mm)
-    path = _new_table(out)
     rows: list[tuple[float, Flux]] = []
     skipped: list[str] = []
-    with _standing_at_the_end(stage, path) as check:
+    with (
+        owning_folder(out, "scan", "rig scan-field"),
+        _standing_at_the_end(stage, out / TABLE) as check,
+    ):
+        path = _new_table(out, devices.log)
         if stage.position_state != "homed":
             report("homing the stage")
             stage.home()
@@ -137,13 +144,14 @@ def _standing_at_the_end(stage: GapStage, path: Path) -> Iterator[Check]:
             raise
 
 
-def _new_table(out: Path) -> Path:
-    path = out / "field.csv"
+def _new_table(out: Path, log: WireLog | None) -> Path:
+    path = out / TABLE
     if path.exists():
         raise StoreError(f"{path}: is there already; name another folder with --out")
     try:
-        out.mkdir(parents=True, exist_ok=True)
         write_text(path, COLUMNS + "\n")
+        if log is not None:
+            log.start(out / WIRE_FILE)
     except OSError as error:
         raise StoreError(f"{path}: cannot be written: {error.strerror}") from None
     return path

@@ -1,39 +1,92 @@
-"""Check that every file of a run is present and unaltered."""
+"""Check a run: every file present and unaltered, every step as the plan says."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
+from ...core.derived import FileFinding, check_derived, compare_digest, read_manifest
 from ...core.errors import StoreError
 from .read import Run, read_run
-from .records import IMAGES, PLAN_FILE, Record, sha256_of_file
+from .records import END_FILE, IMAGES, PLAN_FILE, RUN_FILE, STEPS_FILE
+from .verify_files import check_files, check_records
 
 
-def verify_run(path: Path) -> list[str]:
-    """Return one sentence per problem of the run at `path`; none means it is good.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunCheck:
+    """What a check of a run found.
 
-    Checked are the records, each photograph of each finished step against its SHA-256,
-    the run's own files against the hashes in ``end.json``, that the planned steps are
-    all there if it says success, and that ``images/`` holds nothing else. A run that
-    was cut off is no problem in itself: what it holds must still be whole.
+    Parameters
+    ----------
+    run : Run or None
+        None if it cannot be read.
+    files : tuple of FileFinding
+        One for each file; of a run of format 1 only of those that it accounts for.
+    problems : tuple of str
+        A sentence each; none means that the run is good.
+    """
+
+    run: Run | None
+    files: tuple[FileFinding, ...]
+    problems: tuple[str, ...]
+
+
+def check_run(path: Path) -> RunCheck:
+    """Check every file of a run, and its steps against its plan.
+
+    Records are held against their seals and chains, photographs against the digests in
+    the step records, derived files and what they were made from against the manifest.
+    A run that was cut off is no problem in itself: what it holds must still be whole.
     """
     try:
         run = read_run(path)
-    except StoreError as error:
-        return [str(error)]
-    problems: list[str] = []
-    if not (path / PLAN_FILE).is_file():
-        problems.append(f"{PLAN_FILE}: missing")
-    problems += _steps(run)
-    if run.end is not None:
-        hashes = run.end.get("sha256", {})
-        problems += [
-            problem
-            for name, digest in hashes.items()
-            if (problem := _compare(path, name, digest))
+        files = tuple(check_files(run) if run.schema > 1 else _first_format(run))
+    except (StoreError, OSError) as error:
+        return RunCheck(run=None, files=(), problems=(str(error),))
+    problems = [one.sentence for one in files if one.is_problem]
+    return RunCheck(run=run, files=files, problems=(*problems, *_steps(run)))
+
+
+def verify_run(path: Path) -> list[str]:
+    """Return one sentence per problem of the run at `path`; none means it is good."""
+    return list(check_run(path).problems)
+
+
+def check_used(run: Run, names: Iterable[str]) -> list[FileFinding]:
+    """Check the records of a run, and some files that are about to be used.
+
+    Parameters
+    ----------
+    run : Run
+        From `read_run`.
+    names : iterable of str
+        Derived files and photographs; those that are not there are left to their
+        reader.
+
+    Returns
+    -------
+    list of FileFinding
+        What is altered, older than its inputs, or extra: nothing says what made it.
+        Of a run of format 1, which accounts for less, only what it can tell.
+    """
+    root = run.path
+    wanted = [name for name in names if (root / name).exists()]
+    images = {f["path"]: f["sha256"] for step in run.steps for f in step["files"]}
+    found = [
+        compare_digest(root, name, images[name]) for name in wanted if name in images
+    ]
+    found += check_derived(root, wanted)
+    if run.schema > 1:
+        own = (RUN_FILE, STEPS_FILE, *([END_FILE] if run.end else []))
+        found += [one for one in check_records(run) if one.name in own]
+        known = {*read_manifest(root), *images}
+        found += [
+            FileFinding(name=name, status="extra", detail="nothing says what made it")
+            for name in wanted
+            if name not in known
         ]
-        problems += _extra(run)
-    return problems
+    return [one for one in found if one.is_problem]
 
 
 def _steps(run: Run) -> list[str]:
@@ -52,43 +105,32 @@ def _steps(run: Run) -> list[str]:
                 f"step {index}: gap_mm is {step.get('gap_mm')}, the plan says "
                 f"{gaps_mm[index]}"
             )
-        files = step.get("files", [])
-        if not files:
+        if not step["files"]:
             problems.append(f"step {index}: has no photograph")
-        for file in files:
-            problem = _check_file(run.path, file)
-            problems += [f"step {index}: {problem}"] if problem else []
+    counted = (run.end or {}).get("steps", len(run.steps))
+    if counted != len(run.steps):
+        problems.append(
+            f"{END_FILE} counts {counted} steps, {STEPS_FILE} holds {len(run.steps)}"
+        )
     return problems
 
 
-def _check_file(path: Path, file: Record) -> str:
-    name = str(file.get("path", ""))
-    target = path / name
-    if not target.is_file():
-        return f"{name}: missing"
-    size = target.stat().st_size
-    if size != file.get("bytes"):
-        return f"{name}: altered ({size} bytes, recorded were {file.get('bytes')})"
-    return _compare(path, name, str(file.get("sha256")))
-
-
-def _compare(path: Path, name: str, digest: str) -> str:
-    try:
-        actual = sha256_of_file(path / name)
-    except FileNotFoundError:
-        return f"{name}: missing"
-    except OSError as error:
-        return f"{name}: cannot be read: {error.strerror}"
-    return "" if actual == digest else f"{name}: altered (SHA-256 differs)"
-
-
-def _extra(run: Run) -> list[str]:
-    recorded = {
-        str(file.get("path")) for step in run.steps for file in step.get("files", [])
-    }
-    return [
-        f"{name}: extra (belongs to no finished step)"
-        for entry in sorted((run.path / IMAGES).glob("*"))
-        if (name := f"{IMAGES}/{entry.name}") not in recorded
-        and (run.is_finished or not name.endswith(".png"))
+def _first_format(run: Run) -> list[FileFinding]:
+    """Check what a run of format 1 accounts for: pictures, and records once it ended."""
+    found = [
+        compare_digest(run.path, file["path"], file["sha256"])
+        for step in run.steps
+        for file in step["files"]
     ]
+    if not (run.path / PLAN_FILE).is_file():
+        found.append(FileFinding(name=PLAN_FILE, status="missing"))
+    if run.end is None:
+        return found
+    digests = run.end["sha256"]
+    found += [compare_digest(run.path, name, one) for name, one in digests.items()]
+    known = {one.name for one in found}
+    for entry in sorted((run.path / IMAGES).glob("*")):
+        name = f"{IMAGES}/{entry.name}"
+        if name not in known and (run.is_finished or not name.endswith(".png")):
+            found.append(FileFinding(name=name, status="extra"))
+    return found

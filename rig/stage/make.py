@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..clock import Clock
-from ..link import WireLog
+from ..wire_log import WireLog
 from .config import StageConfig
 from .protocol import Stage
 

@@ -17,8 +17,9 @@ from ...core.errors import StageError
 from ..clock import Clock
 from ..errors import InterlockError, PositionLostError, StoppedError
 from ..interrupts import StopAtOnce
-from ..link import Link, WireLog
+from ..link import Link
 from ..ports import resolve_port
+from ..wire_log import WireLog
 from .config import StageConfig
 from .presence import Presence
 from .protocol import Moved, PositionState, StageIdentity, StageLimits, unheard

@@ -9,9 +9,9 @@ from typing import Any
 from ..bench.config import RigModel
 from ..bench.devices import Devices
 from ..clock import Clock, SteppedClock
-from ..link import WireLog
 from ..stage.gap import GapStage
 from ..stage.make import make_stage
+from ..wire_log import WireLog
 from .board.file import Board, make_board
 from .board.marlin import MarlinBoard
 from .board.plant import Plant
@@ -94,4 +94,4 @@ def open_twin(
     stage.connect()
     parts = TwinParts(board=board, camera=eye, meter=probe, clock=clock, gap=gap_mm)
     schedule_faults(rig.twin.fault, parts)
-    return Devices(stage=stage, camera=eye, meter=probe, clock=clock)
+    return Devices(stage=stage, camera=eye, meter=probe, clock=clock, log=log)

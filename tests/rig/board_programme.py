@@ -17,9 +17,9 @@ from typing import Any
 
 from magbend.rig.clock import Clock
 from magbend.rig.errors import InterlockError, StoppedError
-from magbend.rig.link import WireLog
 from magbend.rig.stage.config import StageConfig
 from magbend.rig.stage.grbl.stage import GrblStage
+from magbend.rig.wire_log import WireLog
 
 _SLOWEST_MM_MIN = 100.0
 _ROW = re.compile(r"^(\S+) \S+ stage (>>|<<|--) (.*)$")

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from magbend.rig.clock import SteppedClock
-from magbend.rig.link import WireLog
 from magbend.rig.stage.config import LimitsConfig, StageConfig
 from magbend.rig.stage.gap import GapStage
 from magbend.rig.stage.grbl.stage import GrblStage
 from magbend.rig.virtual.board.firmware import GrblBoard
 from magbend.rig.virtual.board.plant import Plant
 from magbend.rig.virtual.protocol_twin import register_board
+from magbend.rig.wire_log import WireLog
 
 SETTINGS = {1: 255, 20: 1, 21: 1, 22: 1, 130: 180}
 _NAMES = itertools.count()

@@ -9,9 +9,9 @@ from pydantic import ValidationError
 
 from magbend.core.errors import InputError
 from magbend.rig.errors import InterlockError, PositionLostError
-from magbend.rig.link import WireLog
 from magbend.rig.stage.config import LimitsConfig
 from magbend.rig.virtual.board.plant import Plant
+from magbend.rig.wire_log import WireLog
 
 from .stage_bench import SETTINGS, homed_bench, make_bench
 

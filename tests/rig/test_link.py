@@ -11,12 +11,13 @@ import pytest
 from magbend.core.errors import StageError
 from magbend.rig.clock import ScaledClock, SteppedClock, SystemClock
 from magbend.rig.errors import LinkLostError
-from magbend.rig.link import Link, WireLog
+from magbend.rig.link import Link
 from magbend.rig.ports import resolve_port
 from magbend.rig.stage.presence import Presence
 from magbend.rig.virtual.board.firmware import GrblBoard
 from magbend.rig.virtual.protocol_twin import register_board
 from magbend.rig.virtual.pty_server import PtyBoard
+from magbend.rig.wire_log import WireLog
 
 from .stage_bench import make_bench
 

@@ -14,9 +14,9 @@ import numpy as np
 from magbend.cli.keys import terminating
 from magbend.rig.bench.config import read_plan
 from magbend.rig.clock import SteppedClock
-from magbend.rig.link import WireLog
 from magbend.rig.runs.runner import run
 from magbend.rig.virtual.bench import open_twin
+from magbend.rig.wire_log import WireLog
 
 GENERATOR = np.random.default_rng(8)
 NOISE = GENERATOR.normal(0.0, 1.5, (8, 96, 128))
@@ -47,8 +47,7 @@ def main() -> int:
     out = Path(sys.argv[2])
     pace = float(sys.argv[sys.argv.index("--pace") + 1]) if "--pace" in sys.argv else 0
     clock = PacedClock(pace)
-    out.mkdir(parents=True, exist_ok=True)
-    log = WireLog(out / "wire.log", clock)
+    log = WireLog(None, clock)
     print("ready", flush=True)
     with terminating():
         devices = open_twin(

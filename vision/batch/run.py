@@ -10,14 +10,17 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import cv2
 
-from ...core.errors import MagbendError, VisionError
+from ...core.derived import note_derived
+from ...core.errors import ConfigError, MagbendError, VisionError
 from ...core.files import output_file, output_folder, write_bytes
+from ...core.json import read_json
+from ...core.owned import owning_folder
 from ...core.progress import Progress, silent
 from ..camera.oriented import oriented
 from ..extraction.follow import follow
@@ -25,7 +28,7 @@ from ..extraction.setting import Setting
 from ..measurement import Measurement, failure
 from .inputs import Source, digest, list_sources, read_source
 from .overlay import overlay_png
-from .state import State
+from .state import STATE_FILE, State
 from .tables import Done, FrameRow, done_with
 
 _log = logging.getLogger(__name__)
@@ -56,6 +59,7 @@ def extract_files(
     workers: int = 1,
     resume: bool = False,
     shared_clamp: bool | None = None,
+    made_with: Sequence[Path] = (),
     progress: Progress = silent,
 ) -> BatchResult:
     """Measure photographs and write ``centrelines.csv``, ``frames.csv`` and overlays.
@@ -81,6 +85,8 @@ def extract_files(
         Whether one clamp holds the rod in all photographs, so that they give its
         direction together (`shared_clamp.shared_direction`). None: in those of a run,
         and in the frames of a video. It needs a calibration.
+    made_with : sequence of Path
+        Files behind `setting`, such as the calibration's, for the manifest.
     progress : callable
         Called as ``progress(done, total)``.
 
@@ -89,29 +95,34 @@ def extract_files(
     VisionError
         If a path is missing, or nothing could be measured (the tables, which say why,
         are written all the same).
+    StoreError
+        If `out` is a folder of somebody else, or is being written just now.
     InputError
         If nothing can be written where `out` and `edges` say.
     """
     sources = list_sources(paths)
-    output_folder(out / "overlays" if overlays else out)
-    if edges is not None:
-        output_file(edges)
-    state = State(
-        out, edges, setting.fingerprint(), [source.image for source in sources],
-        _runs(sources, shared_clamp=shared_clamp),
-    )  # fmt: skip
-    if resume:
-        state.load(sources)
-    todo = [source for source in sources if source.image not in state.done]
-    task = _Task(setting, out / "overlays" if overlays else None, edges is not None)
-    progress(len(sources) - len(todo), len(sources))
-    try:
-        for done in _run(task, todo, workers):
-            state.add(done)
-            progress(len(state.done), len(sources))
-    finally:
-        # After an interruption too: what is measured can be resumed.
-        state.write()
+    with owning_folder(out, "extraction", "vision extract", ours=is_made_by_us):
+        if overlays:
+            output_folder(out / "overlays")
+        if edges is not None:
+            output_file(edges)
+        task = _Task(setting, out / "overlays" if overlays else None, edges is not None)
+        state = State(
+            out, edges, setting.fingerprint(), [source.image for source in sources],
+            _runs(sources, shared_clamp=shared_clamp),
+        )  # fmt: skip
+        try:
+            _measure_all(task, sources, state, workers, progress, resume=resume)
+        finally:
+            # After an interruption too: what is measured can be resumed.
+            state.write()
+            drawn = [out / "overlays" / source.overlay for source in sources]
+            made = [*state.files, *(path for path in drawn if path.is_file())]
+            seen = dict.fromkeys([*(s.path for s in sources), *made_with])
+            note_derived(
+                made, sources=[path for path in seen if path.is_file()],
+                command="vision extract",
+            )  # fmt: skip
     frames = tuple(done.row for done in state.ready())
     if not any(frame.ok for frame in frames):
         first = frames[0]
@@ -120,6 +131,29 @@ def extract_files(
             f"{first.image}: {first.reason.removeprefix(f'{first.image}: ')}"
         )
     return BatchResult(out=out, frames=frames)
+
+
+def _measure_all(
+    task: _Task, sources: list[Source], state: State, workers: int, progress: Progress,
+    *, resume: bool,
+) -> None:  # fmt: skip
+    """Measure what `state` does not hold yet."""
+    if resume:
+        state.load(sources)
+    todo = [source for source in sources if source.image not in state.done]
+    progress(len(sources) - len(todo), len(sources))
+    for done in _run(task, todo, workers):
+        state.add(done)
+        progress(len(state.done), len(sources))
+
+
+def is_made_by_us(folder: Path) -> bool:
+    """Return whether a run or an extraction of before the marks lies in a folder."""
+    for name, key in (("run.json", "plan"), (STATE_FILE, "settings_sha256")):
+        with suppress(ConfigError):
+            if key in read_json(folder / name):
+                return True
+    return False
 
 
 def _runs(sources: list[Source], *, shared_clamp: bool | None) -> dict[str, str]:

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-import json
+import logging
 import time
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
+from ...core.derived import file_digest
 from ...core.errors import MagbendError
 from ...core.files import write_text
+from ...core.json import read_json, write_json
 from . import tables
 from .inputs import Source, digest
 from .run_frame import in_own_frame, in_run_frames
 from .tables import Done
 
+_log = logging.getLogger(__name__)
+
 STATE_FILE = "extract.json"
+_TABLES = ("centrelines.csv", "frames.csv")
 _SCHEMA = 2
 _CHECKPOINT_S = 20.0
 
@@ -64,14 +69,23 @@ class State:
             "settings_sha256": self._settings,
             "edges": self._edges is not None,
             "images": {done.row.image: done.sha256 for done in ready},
+            "tables": {name: file_digest(self._out / name) for name in _TABLES},
         }
-        write_text(self._out / STATE_FILE, json.dumps(state, indent=1) + "\n")
+        write_json(self._out / STATE_FILE, state, indent=1)
+
+    @property
+    def files(self) -> list[Path]:
+        """The files that `write` writes."""
+        edges = [self._edges] if self._edges is not None else []
+        return [*(self._out / name for name in (*_TABLES, STATE_FILE)), *edges]
 
     def load(self, sources: list[Source]) -> None:
         """Take over what an earlier call with the same settings has finished."""
         try:
-            state = json.loads((self._out / STATE_FILE).read_text(encoding="utf-8"))
+            state = read_json(self._out / STATE_FILE)
             digests = dict(state["images"])
+            if self._is_edited(state.get("tables") or {}):
+                return
             if (state["schema"], state["settings_sha256"]) != (_SCHEMA, self._settings):
                 return
             if self._edges is not None and not state["edges"]:
@@ -83,6 +97,15 @@ class State:
             done = held.get(source.image)
             if done and source.path.exists() and done.sha256 == digest(source):
                 self.done[source.image] = done
+
+    def _is_edited(self, tables: Mapping[str, str]) -> bool:
+        """Return whether somebody changed the tables; then all is measured anew."""
+        edited = [
+            name for name, sha in tables.items() if file_digest(self._out / name) != sha
+        ]
+        for name in edited:
+            _log.warning("%s was edited: all is measured anew", self._out / name)
+        return bool(edited)
 
     def _held(self, digests: Mapping[str, str]) -> dict[str, Done]:
         """Return what the tables on the disk hold, each in its own frame."""
