@@ -8,7 +8,7 @@ import sys
 import typer
 
 from ..core.errors import MagbendError
-from . import analysis, bench, panel, rig, sim, vision
+from . import analysis, bench, migrate, panel, rig, sim, vision
 
 app = typer.Typer(
     name="magbend",
@@ -25,6 +25,7 @@ app.add_typer(sim.app, name="sim")
 app.add_typer(analysis.app, name="analysis")
 app.command("demo", epilog=bench.DEMO_EXAMPLE)(bench.demo)
 app.command("panel", epilog=panel.EXAMPLE)(panel.panel)
+app.command("migrate", epilog=migrate.EXAMPLE)(migrate.migrate)
 app.command("doctor", epilog=bench.DOCTOR_EXAMPLE)(bench.doctor)
 app.command("examples", epilog=bench.EXAMPLES_EXAMPLE)(bench.examples)
 app.command("schema", epilog=bench.SCHEMA_EXAMPLE)(bench.schema)

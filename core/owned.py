@@ -225,7 +225,8 @@ def altered_marks(folder: Path) -> list[str]:
     """Return the names of marks of a folder that are not as they were written."""
     mark = folder / MARK
     names = []
-    for path in sorted(mark.iterdir()) if mark.is_dir() else ():
+    found = sorted(mark.iterdir()) if mark.is_dir() else []
+    for path in (one for one in found if not one.is_dir()):
         try:
             data = read_file(path, 0.1, StoreError)
             is_good = data == b"" if path.name == LOCK_FILE else is_whole(data)

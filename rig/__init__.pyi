@@ -75,6 +75,7 @@ from .runs.dry_run import (
 from .runs.dry_run import (
     plan_steps as plan_steps,
 )
+from .runs.migrate import migrate_run as migrate_run
 from .runs.read import (
     Run as Run,
 )

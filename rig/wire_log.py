@@ -1,9 +1,9 @@
 """``wire.log``: every byte to and from the devices, each row chained to the one before.
 
 A row is ``monotonic_s utc device direction bytes #digest``; direction is ``>>`` to the
-device, ``<<`` from it and ``--`` a remark; bytes are a Python literal. The digest is the
-beginning of the SHA-256 of the digest before and the row, so that a changed, missing or
-moved row is noticed.
+device, ``<<`` from it and ``--`` a remark; bytes are a Python literal. The digest is
+the beginning of the SHA-256 of the digest before and the row, so that a changed,
+missing or moved row is noticed.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import contextlib
 import hashlib
 import threading
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
@@ -77,6 +78,8 @@ class WireLog:
             If it is no log, or is damaged.
         """
         with self._lock:
+            if self._file is not None:
+                self._file.close()
             file = path.open("ab", buffering=0)
             try:
                 check = check_wire_log(path)
@@ -171,3 +174,12 @@ def check_wire_log(path: Path) -> WireCheck:
     return WireCheck(
         head=head, whole_bytes=whole_bytes, bad_row=bad_row, digests=tuple(digests)
     )
+
+
+def chained(rows: Iterable[str]) -> bytes:
+    """Return the text of a log made of rows that have no digests yet."""
+    head, lines = WireHead(), []
+    for row in rows:
+        head = head.after(row)
+        lines.append(f"{row} #{head.digest}\n")
+    return "".join(lines).encode("utf-8", "surrogateescape")

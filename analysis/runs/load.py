@@ -310,7 +310,8 @@ def load_run(path: Path | str, *, unverified: bool = False) -> RunData:
     Raises
     ------
     StoreError
-        If a file was altered or its inputs were, is missing, torn beyond use or does not hold what it should: one
+        If a file was altered or is older than its inputs, is missing, torn beyond use
+        or does not hold what it should: one
         sentence with the command that makes it.
     """
     stored = read_run(Path(path))

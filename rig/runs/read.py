@@ -182,8 +182,9 @@ def _step(line: bytes) -> Record:
         If it is no such record.
     """
     record = parse_json(line)
-    if not isinstance(record, dict):
-        raise ValueError("it is no object")  # noqa: TRY004 - as all that is not whole
+    well = isinstance(record, dict) and isinstance(record.get("settle", {}), dict)
+    if not well:
+        raise ValueError("it is no object, or settle is none")
     index = record.get("index")
     if type(index) is not int or not 0 <= index < _MOST_STEPS:
         raise ValueError(f"index is {shown(index)}")
@@ -195,8 +196,6 @@ def _step(line: bytes) -> Record:
         value = record.get(name)
         if value is not None and type(value) not in (int, float):
             raise ValueError(f"{name} is {shown(value)}, which is no number")
-    if not isinstance(record.get("settle", {}), dict):
-        raise ValueError("settle is no object")
     return record
 
 

@@ -116,7 +116,7 @@ def _steps(run: Run) -> list[str]:
 
 
 def _first_format(run: Run) -> list[FileFinding]:
-    """Check what a run of format 1 accounts for: pictures, and records once it ended."""
+    """Check what a run of format 1 accounts for: pictures, once it ended records."""
     found = [
         compare_digest(run.path, file["path"], file["sha256"])
         for step in run.steps

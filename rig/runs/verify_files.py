@@ -1,7 +1,7 @@
 """What became of each file of a run: good, torn, altered, missing or extra.
 
-From format 2 on every file is accounted for: records by their seals and chains, pictures
-by the digests in the step records, derived files by the manifest.
+From format 2 on every file is accounted for: records by their seals and chains,
+pictures by the digests in the step records, derived files by the manifest.
 """
 
 from __future__ import annotations
@@ -79,10 +79,14 @@ def check_records(run: Run) -> Iterator[FileFinding]:
     if run.end is not None:
         yield _sealed(END_FILE, read_file(root / END_FILE, kind=StoreError))
     yield from _wire_log(run)
+    kept = (run.manifest.get("migrated") or {}).get("sha256") or {}
+    for name, digest in kept.items():
+        yield compare_digest(root, str(name), str(digest))
     for name in altered_marks(root):
         yield FileFinding(name=name, status="altered", detail="its seal is broken")
     for path in sorted((root / MARK).glob("*")):
-        yield FileFinding(name=f"{MARK}/{path.name}", status="good")
+        if path.is_file():
+            yield FileFinding(name=f"{MARK}/{path.name}", status="good")
 
 
 def _sealed(name: str, data: bytes) -> FileFinding:
@@ -143,6 +147,11 @@ def _why_not_whole(check: WireCheck, noted: list[dict[str, Any]]) -> str:
         if rows and check.digests[rows - 1] != head.get("digest"):
             return f"row {rows} is not the one that was recorded"
     return ""
+
+
+def unaccounted(run: Run) -> list[str]:
+    """Return the names of files of which nothing says what made them."""
+    return [one.name for one in check_files(run) if one.status == "extra"]
 
 
 def _extra(run: Run, known: set[str]) -> Iterator[FileFinding]:

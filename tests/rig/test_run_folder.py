@@ -18,7 +18,7 @@ from magbend.rig.runs.folder import RunFolder
 from magbend.rig.runs.read import read_run, read_steps
 from magbend.rig.runs.verify import verify_run
 
-MANIFEST = {"schema": 1, "name": "t", "plan": {"gaps_mm": [70.0, 60.0]}}
+MANIFEST = {"name": "t", "plan": {"gaps_mm": [70.0, 60.0]}}
 
 
 def commit(folder: RunFolder, index: int, data: bytes = b"picture") -> None:
@@ -178,12 +178,15 @@ def test_interrupts_wait_for_the_record(path: Path, monkeypatch) -> None:
     [
         (lambda p: (p / "images/step_000.png").unlink(), "step_000.png: missing"),
         (lambda p: (p / "images/step_001.png").write_bytes(b"picturE"), "SHA-256"),
-        (lambda p: (p / "images/step_001.png").write_bytes(b"pic"), "3 bytes"),
+        (
+            lambda p: (p / "images/step_001.png").write_bytes(b"pic"),
+            "001.png: altered",
+        ),
         (lambda p: (p / "images/extra.png").write_bytes(b"x"), "extra.png: extra"),
         (lambda p: (p / "plan.toml").write_text("other"), "plan.toml: altered"),
         (lambda p: (p / "plan.toml").unlink(), "plan.toml: missing"),
         (lambda p: (p / "run.json").unlink(), "no run.json"),
-        (lambda p: (p / "run.json").write_text("{"), "run.json: cannot be read"),
+        (lambda p: (p / "run.json").write_text("{"), "run.json: is damaged"),
         (
             lambda p: (p / "steps.jsonl").write_text(
                 (p / "steps.jsonl").read_text().replace("70.0", "71.0")

@@ -12,6 +12,7 @@ from magbend.core.errors import CameraError, StoreError
 from magbend.rig.errors import InterlockError, LinkLostError
 from magbend.rig.runs.control import RunControl
 from magbend.rig.runs.read import read_run
+from magbend.rig.runs.records import SCHEMA
 from magbend.rig.runs.runner import run
 from magbend.rig.runs.verify import verify_run
 
@@ -48,7 +49,7 @@ def test_the_manifest_is_written_before_anything_moves(bench, tmp_path: Path) ->
 
     def before(call: str) -> None:
         if call == "home":
-            seen.append(json.loads((out / "run.json").read_text())["schema"] == 1)
+            seen.append(json.loads((out / "run.json").read_text())["schema"] == SCHEMA)
 
     bench.raw.before = before
     run(bench.plan, bench.devices, out)

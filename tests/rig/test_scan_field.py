@@ -52,5 +52,8 @@ def test_limits_and_older_tables_are_respected(bench, tmp_path: Path) -> None:
         scan_field(bench.devices, (70.0, 30.0), tmp_path / "s")
     assert bench.raw.calls == ["connect"]
     (tmp_path / "field.csv").write_text("mine")
-    with pytest.raises(StoreError, match="there already"):
+    with pytest.raises(StoreError, match="was not made by magbend"):
         scan_field(bench.devices, (70.0,), tmp_path)
+    scan_field(bench.devices, (70.0,), tmp_path / "s")
+    with pytest.raises(StoreError, match="there already"):
+        scan_field(bench.devices, (70.0,), tmp_path / "s")
