@@ -220,8 +220,18 @@ def extract(
     json_output: bool = JSON,
 ) -> None:  # fmt: skip
     """Measure the rod's centreline in photographs."""
+    from ..core.derived import note_derived
     from ..core.files import output_file
-    from ..vision import extract_files, figure_kind, list_sources, with_specimen
+    from ..core.owned import owning_folder
+    from ..vision import (
+        extract_files,
+        figure_kind,
+        figure_of_steps,
+        is_made_by_us,
+        list_sources,
+        read_source,
+        with_specimen,
+    )
 
     if figure_steps is not None:
         figure_kind(figure_steps)
@@ -247,28 +257,33 @@ def extract(
     rod = _specimen(specimen, run)
     if rod is not None:
         setting = with_specimen(setting, rod)
-    for path in (edges, figure_steps):
-        if path is not None:
-            output_file(path)
+    made_with = [path for path in (calibration, bare) if path is not None]
     kept = f"{folder} holds what was measured; --resume goes on from there"
-    with progress("photographs", kept=kept) as report:
-        result = extract_files(
-            images,
-            folder,
-            setting=setting,
-            overlays=overlays,
-            edges=edges,
-            workers=workers or _workers(len(sources)),
-            resume=resume,
-            shared_clamp=shared_clamp,
-            made_with=[path for path in (calibration, bare) if path is not None],
-            progress=report,
-        )
-    if figure_steps is not None:
-        from ..vision import figure_of_steps, read_source
-
-        index = next(i for i, frame in enumerate(result.frames) if frame.ok)
-        figure_of_steps(read_source(sources[index]), setting, figure_steps)
+    with owning_folder(folder, "extraction", "vision extract", ours=is_made_by_us):
+        for path in (edges, figure_steps):
+            if path is not None:
+                output_file(path)
+        with progress("photographs", kept=kept) as report:
+            result = extract_files(
+                images,
+                folder,
+                setting=setting,
+                overlays=overlays,
+                edges=edges,
+                workers=workers or _workers(len(sources)),
+                resume=resume,
+                shared_clamp=shared_clamp,
+                made_with=made_with,
+                progress=report,
+            )
+        if figure_steps is not None:
+            index = next(i for i, frame in enumerate(result.frames) if frame.ok)
+            shown = sources[index]
+            figure_of_steps(read_source(shown), setting, figure_steps)
+            note_derived(
+                [figure_steps], sources=[shown.path, *made_with],
+                command="vision extract --figure-steps",
+            )  # fmt: skip
     tell_frames(result, json_output=json_output)
 
 

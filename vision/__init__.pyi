@@ -25,6 +25,9 @@ from .batch.run import (
 from .batch.run import (
     extract_files as extract_files,
 )
+from .batch.run import (
+    is_made_by_us as is_made_by_us,
+)
 from .batch.tables import (
     FrameRow as FrameRow,
 )

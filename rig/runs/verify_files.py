@@ -35,6 +35,7 @@ from .records import (
     STEPS_FILE,
     WIRE_FILE,
 )
+from .step_table import step_table
 
 _MOST_FILES = 1_000_000
 
@@ -166,19 +167,26 @@ def _extra(run: Run, known: set[str]) -> Iterator[FileFinding]:
                 raise StoreError(f"{root}: holds more than {_MOST_FILES} files")
             inner = (Path(at) / name).relative_to(root).as_posix()
             if inner not in known:
-                yield FileFinding(name=inner, status="extra", detail=_why(run, inner))
+                yield _unknown(run, inner)
 
 
-def _why(run: Run, name: str) -> str:
+def _unknown(run: Run, name: str) -> FileFinding:
     try:
-        inside(run.path, name, StoreError)
+        path = inside(run.path, name, StoreError)
     except StoreError:
-        return "a link that leaves the folder"
+        detail = "a link that leaves the folder"
+        return FileFinding(name=name, status="extra", detail=detail)
+    if not run.is_finished and path.name.endswith(".tmp"):
+        return FileFinding(name=name, status="torn", detail="a write that was cut off")
+    if run.end is None and name == STEP_TABLE_FILE:
+        # Written just before the ending; it says what the records say, or is altered.
+        table = step_table(run.steps).encode()
+        is_same = read_file(path, kind=StoreError) == table
+        return FileFinding(name=name, status="good" if is_same else "altered")
+    detail = "nothing says what made it"
     if name.startswith(f"{IMAGES}/") and not run.is_finished:
-        return (
+        detail = (
             "a photograph without a record: the run was cut off just then, or the "
             "record was taken away"
         )
-    if name == STEP_TABLE_FILE or name.endswith(".tmp"):
-        return "left by a write that was cut off"
-    return "nothing says where it comes from"
+    return FileFinding(name=name, status="extra", detail=detail)

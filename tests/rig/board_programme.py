@@ -22,7 +22,7 @@ from magbend.rig.stage.grbl.stage import GrblStage
 from magbend.rig.wire_log import WireLog
 
 _SLOWEST_MM_MIN = 100.0
-_ROW = re.compile(r"^(\S+) \S+ stage (>>|<<|--) (.*)$")
+_ROW = re.compile(r"^(\S+) \S+ stage (>>|<<|--) (.*) #\w+$")
 
 
 @dataclass

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from magbend.core.errors import StageError, StoreError
+from magbend.core.errors import InputError, StageError
 from magbend.rig.bench.config import Plan, read_plan
 from magbend.rig.bench.devices import Devices
 from magbend.rig.clock import SteppedClock
@@ -316,7 +316,7 @@ def test_a_folder_that_cannot_be_written_moves_nothing(
     rig = Rig(read_plan(plan_file))
     devices = rig.open()
     (tmp_path / "file").write_text("x")
-    with pytest.raises(StoreError):
+    with pytest.raises(InputError):
         run(rig.plan, devices, tmp_path / "file" / "out", twin=True)
     assert devices.stage.position_state == "unknown"
     devices.close()

@@ -48,7 +48,9 @@ def check(out: Path, before: list[dict]) -> list[dict]:
     steps = list(read_run(out).steps)
     assert steps[: len(before)] == before, "a finished step was lost or changed"
     assert [step["index"] for step in steps] == list(range(len(steps)))
-    assert verify_run(out) == []
+    # A kill between photograph and record leaves a photograph, which is named.
+    problems = [p for p in verify_run(out) if f"step_{len(steps):03d}.png" not in p]
+    assert problems == []
     return steps
 
 

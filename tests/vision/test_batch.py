@@ -294,7 +294,7 @@ def test_interruption_leaves_whole_tables_to_resume(tmp_path, folder):
 def test_run_folder_means_its_images(tmp_path, good):
     run = tmp_path / "run"
     (run / "images").mkdir(parents=True)
-    (run / "run.json").write_text("{}")
+    (run / "run.json").write_text('{"schema": 1, "plan": {}}')
     save(run / "images" / "step_000.png", good.image)
     save(run / "calib.png", good.image)
     result = extract_files([run], run, setting=SETTINGS)
