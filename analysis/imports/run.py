@@ -22,9 +22,11 @@ import numpy as np
 
 from ...core.centreline import COLUMNS
 from ...core.decode import read_bytes
+from ...core.derived import note_derived
 from ...core.errors import ConfigError
 from ...core.files import output_folder, write_bytes, write_text
 from ...core.magnet import Magnet
+from ...core.owned import owning_folder
 from ...core.specimen import Specimen
 from ...core.specimen_file import MagnetModel, read_specimen, specimen_dict
 from ...core.toml import read_toml
@@ -156,20 +158,26 @@ def _write(
     record = _record(table, job)
     if magnet is not None:
         record["rig"]["magnet"] = magnet.model_dump(mode="json")
-    output_folder(out.parent)
-    folder = RunFolder.create(out, record, _plan_text(record))
-    output_folder(out / SOURCES)
-    write_bytes(out / SOURCES / table.name, read_bytes(table))
-    for index, row in enumerate(job.rows):
-        _commit(folder, table, index, row, images[index], (job.measured, job.simulated))
-    if calibration_file is not None:
-        write_bytes(out / "calibration.json", read_bytes(calibration_file))
-    if job.measured:
-        _write_measured(out, images, job.measured)
-    if job.simulated:
-        lines = {index: shape.line for index, shape in job.simulated.items()}
-        write_text(out / imported.FILE, imported.imported_table(lines))
-    folder.finish("success", f"imported from {table.name}")
+    with owning_folder(out, "run", "analysis import"):
+        folder = RunFolder.create(out, record, _plan_text(record))
+        output_folder(out / SOURCES)
+        made = [out / SOURCES / table.name]
+        write_bytes(made[0], read_bytes(table))
+        for index, row in enumerate(job.rows):
+            shapes = (job.measured, job.simulated)
+            _commit(folder, table, index, row, images[index], shapes)
+        if calibration_file is not None:
+            made.append(out / "calibration.json")
+            write_bytes(made[-1], read_bytes(calibration_file))
+        if job.measured:
+            made += _write_measured(out, images, job.measured)
+        if job.simulated:
+            lines = {index: shape.line for index, shape in job.simulated.items()}
+            made.append(out / imported.FILE)
+            write_text(made[-1], imported.imported_table(lines))
+        folder.finish("success", f"imported from {table.name}")
+        sources = [table, *([calibration_file] if calibration_file else [])]
+        note_derived(made, sources=sources, command="analysis import")
     return ImportedRun(
         path=out,
         specimen=job.specimen,
@@ -324,7 +332,9 @@ def _commit(
     )
 
 
-def _write_measured(out: Path, images: Sequence[str], shapes: dict[int, Shape]) -> None:
+def _write_measured(
+    out: Path, images: Sequence[str], shapes: dict[int, Shape]
+) -> list[Path]:
     """Write frames.csv and centrelines.csv of shapes that were measured elsewhere."""
     done = []
     for index, shape in shapes.items():
@@ -343,6 +353,7 @@ def _write_measured(out: Path, images: Sequence[str], shapes: dict[int, Shape]) 
         done.append(Done(row=frame, sha256="", points=points))
     write_text(out / "frames.csv", write_frames(each.row for each in done))
     write_text(out / "centrelines.csv", write_centrelines(done))
+    return [out / "frames.csv", out / "centrelines.csv"]
 
 
 def _notes(shapes: Sequence[Shape]) -> tuple[str, ...]:
