@@ -25,6 +25,15 @@ from .fit.posterior import (
 from .fit.problem import (
     common_support as common_support,
 )
+from .fit.proposals import (
+    Proposal as Proposal,
+)
+from .fit.proposals import (
+    limits_of_knowledge as limits_of_knowledge,
+)
+from .fit.proposals import (
+    proposals as proposals,
+)
 from .fit.result import (
     FitResult as FitResult,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from . import analysis_import, analysis_model, analysis_runs
+from . import analysis_fit, analysis_import, analysis_model, analysis_runs
 from .console import group
 
 app = group(
@@ -12,5 +12,6 @@ app = group(
 )
 
 analysis_runs.register(app)
+analysis_fit.register(app)
 analysis_import.register(app)
 analysis_model.register(app)

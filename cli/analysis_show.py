@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ import typer
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ..analysis import FitResult
+    from ..analysis import FitResult, Proposal
 
 
 def print_comparison(table: pd.DataFrame) -> None:
@@ -125,3 +126,20 @@ def _print_verdict(result: FitResult) -> None:
     sentence = model_sentence(verdict.models)
     if sentence:
         typer.echo(f"  {sentence}")
+
+
+def print_proposals(
+    result: FitResult, found: Sequence[Proposal], limits: Sequence[str]
+) -> None:
+    """Print what could be done next, and what no photograph can tell."""
+    now = [sd / value for value, sd in zip(result.E_MPa, result.E_sd_MPa, strict=True)]
+    known = [100.0 * share for share in now if math.isfinite(share)]
+    if known:
+        typer.echo(
+            f"{result.specimen.name}: the worst modulus is known to {max(known):.2g} %"
+        )
+    typer.echo("sd, %  minutes  change")
+    for one in found:
+        typer.echo(f"{one.predicted_sd_percent:5.2f}  {one.minutes:7.0f}  {one.change}")
+    for sentence in limits:
+        typer.echo(sentence)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ... import sim
 from ...core.cross_section import ALL_SIZES
+from ...core.errors import InputError
 from ...core.specimen import Section, Specimen
 from ..compare.metrics import position_at
 from .nuisance import Owner
@@ -44,7 +46,7 @@ def shape_of(problem: Problem, shot: Shot, values: Values) -> Array | None:
     xy_mm = solved_mm(problem, shot, specimen, values)
     if xy_mm is None:
         return None
-    return xy_mm + nominal + values.get(CURVATURE, 0.0) * per_curvature
+    return np.asarray(xy_mm + nominal + values.get(CURVATURE, 0.0) * per_curvature)
 
 
 def solved_mm(
@@ -90,8 +92,9 @@ def _bowed(problem: Problem, shot: Shot, unknowns: Array) -> Shot:
     ]
     if any(section.natural_curvature_per_mm is not None for section in rod.sections):
         at[2:] = []  # each section has its own: it is taken as it is
-    seen = [solved_mm(problem, shot, specimen, values) for specimen in at]
-    if any(xy is None for xy in seen):
+    solved = [solved_mm(problem, shot, specimen, values) for specimen in at]
+    seen = [xy_mm for xy_mm in solved if xy_mm is not None]
+    if len(seen) < len(at):
         return shot
     column = np.zeros_like(shot.bow[1])
     if len(seen) > 2:
@@ -134,7 +137,9 @@ def stated(datum: Datum, values: Values) -> float:
     if datum.kind == "width_mm":
         side_mm = float(np.mean(datum.specimen.sides_mm))
         return scale * side_mm * (1.0 + values.get("side_percent", 0.0) / 100.0)
-    field = _field_of(datum.field, values)
+    if datum.field is None:
+        raise InputError(f"a datum of {datum.kind} needs the field it was read in")
+    field = _magnet_of(datum.field, values)
     gain = 1.0 + values.get("meter_percent", 0.0) / 100.0
     flux_mT = tip_flux_mT(field, datum.specimen.length_mm)
     return gain * flux_mT + values.get("meter_offset_mT", 0.0)
@@ -192,7 +197,7 @@ def rod_of(nominal: Specimen, values: Values) -> Specimen:
 
 def _scaled(
     part: Specimen | Section, names: Sequence[str], factor: float
-) -> dict[str, float]:
+) -> dict[str, Any]:
     """Return the numbers that a part has of its own, times a factor."""
     own = {name: getattr(part, name) for name in names}
     return {name: factor * value for name, value in own.items() if value is not None}
@@ -216,23 +221,27 @@ def _graded(rod: Specimen, share: float) -> Specimen:
     return replace(rod, sections=tuple(pieces))
 
 
+def _magnet_of(field: sim.MagnetField, values: Values) -> sim.MagnetField:
+    magnet = field.magnet
+    factor = 1.0 + values.get("magnet_percent", 0.0) / 100.0
+    if "magnet_remanence_T" in values:
+        factor *= values["magnet_remanence_T"] / magnet.remanence_T
+    x, y, z = magnet.offset_mm
+    return sim.MagnetField(
+        magnet=replace(
+            magnet,
+            remanence_T=magnet.remanence_T * factor,
+            offset_mm=(x + values.get("magnet_offset_mm", 0.0), y, z),
+        ),
+        gap_mm=field.gap_mm + values.get("gap_mm", 0.0),
+    )
+
+
 def _field_of(
-    field: sim.UniformField | sim.MagnetField | None, values: Values
+    field: sim.UniformField | sim.MagnetField, values: Values
 ) -> sim.UniformField | sim.MagnetField:
     if isinstance(field, sim.MagnetField):
-        magnet = field.magnet
-        factor = 1.0 + values.get("magnet_percent", 0.0) / 100.0
-        if "magnet_remanence_T" in values:
-            factor *= values["magnet_remanence_T"] / magnet.remanence_T
-        x, y, z = magnet.offset_mm
-        return sim.MagnetField(
-            magnet=replace(
-                magnet,
-                remanence_T=magnet.remanence_T * factor,
-                offset_mm=(x + values.get("magnet_offset_mm", 0.0), y, z),
-            ),
-            gap_mm=field.gap_mm + values.get("gap_mm", 0.0),
-        )
+        return _magnet_of(field, values)
     # A uniform field is known by its reading alone.
     true_mT = field.flux_mT - values.get("meter_offset_mT", 0.0)
     true_mT /= 1.0 + values.get("meter_percent", 0.0) / 100.0

@@ -55,7 +55,7 @@ def compare_models(result: FitResult, limits: Limits) -> tuple[ModelFit, ...]:
         for model in MODELS:
             if model != result.model:
                 other = replace(result.problem, model=model)
-                again = alternative(other, limits, list(result.unknowns))
+                again = alternative(other, limits, result.unknowns)
                 if again is not None:
                     found.append(_of(again))
     return tuple(sorted(found, key=lambda model: model.aic))

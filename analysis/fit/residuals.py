@@ -40,7 +40,7 @@ def residuals(problem: Problem, unknowns: Array) -> tuple[Array, Array]:
     jacobian : ndarray, shape (n, p + q)
         Derivatives of the residuals.
     """
-    parts = [_line_rows(problem, shot, unknowns) for shot in problem.shots]
+    parts = [line_rows(problem, shot, unknowns) for shot in problem.shots]
     parts += [_number_rows(problem, datum, unknowns) for datum in problem.data]
     return (
         np.concatenate([residual for residual, _ in parts]),
@@ -80,7 +80,8 @@ def distances_mm(problem: Problem, unknowns: Array) -> list[Array | None]:
     return out
 
 
-def _line_rows(problem: Problem, shot: Shot, unknowns: Array) -> tuple[Array, Array]:
+def line_rows(problem: Problem, shot: Shot, unknowns: Array) -> tuple[Array, Array]:
+    """Return the rows of one line, and their derivatives."""
     values = values_of(problem, shot.owner, unknowns)
     middle = shape_of(problem, shot, values)
     count = len(shot.modes)

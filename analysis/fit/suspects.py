@@ -11,6 +11,9 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ... import sim
 from ...core.errors import MagbendError
 from ...core.specimen import Specimen
@@ -18,7 +21,9 @@ from .nuisance import unit_of
 from .problem import Problem, with_prior
 from .residuals import residuals
 from .result import FitResult, result_of
-from .search import Limits, on_bounds, priors, search
+from .search import Limits, nearby, on_bounds, priors
+
+Array = NDArray[np.float64]
 
 FEW = 4
 """How many of the best are fitted."""
@@ -77,8 +82,7 @@ def scored(result: FitResult) -> list[Suspect]:
     wide = result.problem
     for (name, index), sd in asked.items():
         wide = with_prior(wide, name, index, sd)
-    unknowns = [*result.unknowns, *([0.0] * len(asked))]
-    _, jacobian = residuals(wide, unknowns)  # type: ignore[arg-type]
+    _, jacobian = residuals(wide, np.append(result.unknowns, np.zeros(len(asked))))
     p = len(wide.names)
     found = []
     for k, (key, sd) in enumerate(zip(wide.nuisances, wide.nuisance_sd, strict=True)):
@@ -131,7 +135,7 @@ def _refit(result: FitResult, limits: Limits, change: Suspect) -> Suspect | None
     sd = FREE * known.get(change.key, change.sd)
     wide = with_prior(problem, *change.key, sd)
     k = len(wide.names) + wide.nuisances.index(change.key)
-    begin = [*result.unknowns, *([0.0] * (wide.size - problem.size))]
+    begin = np.append(result.unknowns, np.zeros(wide.size - problem.size))
     begin[k] *= known.get(change.key, sd) / sd
     again = alternative(wide, limits, begin)
     if again is None:
@@ -145,12 +149,10 @@ def _refit(result: FitResult, limits: Limits, change: Suspect) -> Suspect | None
     )
 
 
-def alternative(
-    problem: Problem, limits: Limits, begin: list[float] | None = None
-) -> FitResult | None:
+def alternative(problem: Problem, limits: Limits, begin: Array) -> FitResult | None:
     """Fit another model to the same lines with the same errors; None if that fails."""
     try:
-        unknowns = search(problem, limits, begin)  # type: ignore[arg-type]
+        unknowns = nearby(problem, limits, begin)
         return result_of(
             problem,
             priors(problem, limits),
@@ -175,7 +177,7 @@ def _other_rods(result: FitResult, limits: Limits) -> list[Suspect]:
         seen.add(_sizes(other))
         if abs(other.length_mm / nominal.length_mm - 1.0) > 0.05:
             continue
-        again = alternative(_with_rod(problem, other), limits, list(result.unknowns))
+        again = alternative(_with_rod(problem, other), limits, result.unknowns)
         if again is None:
             continue
         gain = result.linear.chi2 - again.linear.chi2

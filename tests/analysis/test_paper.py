@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,8 @@ from analysis_factory import write_run
 
 from magbend import sim
 from magbend.analysis import compare_run, load_run
-from magbend.analysis.paper.audit import audit_paper, end_face_share, write_audit
+from magbend.analysis.paper.audit import audit_paper, write_audit
+from magbend.analysis.paper.field_claims import end_face_share
 from magbend.analysis.paper.paper import gmc_numbers, reproduce
 from magbend.analysis.paper.probe import (
     fit_standoff,
@@ -79,19 +81,52 @@ def test_probe_refuses_what_cannot_be(tmp_path: Path) -> None:
         read_probe_csv(table)
 
 
+FINDINGS = audit_paper()
+
+
 def test_audit_computes_its_verdicts() -> None:
-    findings = audit_paper()
+    findings = FINDINGS
     by_claim = {finding.claim: finding for finding in findings}
-    verdicts = [finding.verdict for finding in findings[:3]]
+    verdicts = [finding.verdict for finding in findings[1:4]]
     assert verdicts == ["reproduced", "reproduced", "differs"]
-    values = [round(finding.value, 4) for finding in findings[:3]]
+    values = [round(finding.value, 4) for finding in findings[1:4]]
     assert values == [1.3578, 1.3050, 1.2186]
-    assert "70.07 mT" in findings[2].evidence
+    assert "70.07 mT" in findings[3].evidence
     weight = by_claim["the rod's weight is left out"]
     assert weight.value == pytest.approx(-35.0, abs=1.5)
     field = next(f for f in findings if "uniform field" in f.claim)
     assert field.value == pytest.approx(30.8, abs=0.1)
     assert all(finding.evidence for finding in findings)
+
+
+@pytest.mark.parametrize(
+    ("words", "value", "off", "verdict", "says"),
+    [
+        ("more circular", 0.850, 0.004, "reproduced", "0.805 for GMC 6"),
+        ("readings of one magnet", 20.0, 1.0, "differs", "which no magnet has"),
+        ("sides of 0.75", -11.2, 0.1, "matters", "1 to 0.97 mm: tip +5.9 %"),
+        ("one recipe", 6.6, 0.1, "matters", "stated nowhere"),
+        ("200, 150 and 100 %", 175.0, 1.0, "supports", "1.00/0.80/0.57"),
+        ("2:1, 5:1 and 6:1", 20.0, 12.0, "differs", "nearly one material"),
+        ("lie within 8 to 50", 7.5, 0.0, "differs", "7.5 to 20 MPa"),
+        ("outer diameters", 33.3, 0.1, "matters", "square"),
+        ("all 27 sets", 21.0, 0.0, "differs", "Nothing makes ten"),
+        ("Eqs. 1 to 4", 38.3145, 1e-3, "negligible", "(Y0 + y)"),
+        ("mean squared error", 0.37, 0.03, "matters", "no unit"),
+        ("Table 1", math.nan, 0.0, "differs", "sides"),
+    ],
+)
+def test_audit_says_what_the_paper_leaves_out(
+    words: str, value: float, off: float, verdict: str, says: str
+) -> None:
+    (finding,) = [f for f in FINDINGS if words in f.claim]
+    assert finding.verdict == verdict
+    assert says in finding.claim + finding.evidence
+    assert finding.value == pytest.approx(value, abs=off, nan_ok=True)
+
+
+def test_the_papers_first_claim_stands_up_front() -> None:
+    assert "circular" in FINDINGS[0].claim
 
 
 def test_end_face_carries_half_by_an_independent_field() -> None:
@@ -109,7 +144,7 @@ def test_end_face_carries_half_by_an_independent_field() -> None:
 
 
 def test_audit_page_stands_alone(tmp_path: Path) -> None:
-    write_audit(tmp_path / "audit.html", audit_paper())
+    write_audit(tmp_path / "audit.html", FINDINGS)
     text = (tmp_path / "audit.html").read_text()
     assert "1.2186 T" in text
     assert "http" not in text
