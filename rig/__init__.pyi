@@ -112,10 +112,10 @@ from .stage.config import (
 from .stage.gap import (
     GapStage as GapStage,
 )
-from .stage.gap import (
+from .stage.gap_records import (
     GapStatus as GapStatus,
 )
-from .stage.gap import (
+from .stage.gap_records import (
     MoveRecord as MoveRecord,
 )
 from .stage.grbl.stage import (
