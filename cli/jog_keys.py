@@ -22,11 +22,15 @@ QUIT = {"q", "\x03", END}
 _HELP = """\
 up, right: farther   down, left: nearer   1 to 5: steps of 0.1, 0.5, 1, 5, 10 mm
 H: home   space: stop   q: quit"""
-_WIDTH = 60
+_WIDTH = 66
+NUDGE_MM = 1.0
 
 
 def jog_loop(stage: GapStage) -> None:
     """Read keys and move until ``q``.
+
+    A stage that does not know where it is, or whose gap was never measured, goes by
+    1 mm at most, slowly.
 
     Raises
     ------
@@ -63,21 +67,31 @@ def _act(stage: GapStage, key: str, step_mm: float, keyboard: Keyboard) -> None:
             with _space_stops(stage, keyboard):
                 stage.home()
         elif key in FARTHER | NEARER:
-            here_mm = stage.status().gap_mm
-            if here_mm is None:
-                raise RigError("the gap is not known; press H to home the stage")
-            sign = 1.0 if key in FARTHER else -1.0
+            way_mm = step_mm if key in FARTHER else -step_mm
             with _space_stops(stage, keyboard):
-                stage.goto_gap(
-                    here_mm + sign * step_mm,
-                    moved=lambda gap_mm: _show(
-                        f"gap {gap_mm:8.3f} mm  moving  step {step_mm:g} mm"
-                    ),
-                )
+                _go(stage, way_mm)
     except KeyboardInterrupt:
         _show(f"stopped; the position is {stage.position_state}\n")
     except RigError as error:
         _show(f"{error}\n")
+
+
+def _go(stage: GapStage, way_mm: float) -> None:
+    """Go farther (positive) or nearer, as the rig file understands that."""
+    status = stage.status()
+    if status.gap_mm is not None and not status.doubt:
+        stage.goto_gap(
+            status.gap_mm + way_mm,
+            moved=lambda gap_mm: _show(
+                f"gap {gap_mm:8.3f} mm  moving  step {abs(way_mm):g} mm"
+            ),
+        )
+        return
+    if status.state == "alarm":
+        raise RigError("the stage is locked: press H to home it (or: rig unlock)")
+    limited_mm = max(-NUDGE_MM, min(NUDGE_MM, way_mm))
+    _show(f"slowly, {abs(limited_mm):g} mm: the place is not known, watch the rod")
+    stage.nudge(stage.place_map.direction * limited_mm)
 
 
 @contextlib.contextmanager
@@ -105,6 +119,8 @@ def _space_stops(stage: GapStage, keyboard: Keyboard) -> Iterator[None]:
 def _show_status(stage: GapStage, step_mm: float) -> None:
     status = stage.status()
     where = "unknown" if status.gap_mm is None else f"{status.gap_mm:8.3f} mm"
+    if status.gap_mm is None and status.stage_mm is not None:
+        where = f"unknown (machine {status.stage_mm:.3f} mm)"
     _show(f"gap {where}  {status.state} {status.position_state}  step {step_mm:g} mm")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from . import rig_ask, rig_run, rig_stage
+from . import rig_ask, rig_flux, rig_gap, rig_run, rig_stage
 from .console import group
 
 app = group(
@@ -11,5 +11,7 @@ app = group(
     "magbend rig run plan.toml --out runs/gmc2",
 )
 rig_stage.register(app)
+rig_gap.register(app)
 rig_ask.register(app)
 rig_run.register(app)
+rig_flux.register(app)

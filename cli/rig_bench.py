@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
-from .keys import answering
+from .rig_flux import asker
 
 if TYPE_CHECKING:
     from ..rig import Clock, Devices, Owner, Plan, RunControl
@@ -26,36 +23,6 @@ def asks_flux(plan: Plan, readings_mT: dict[float, float] | None) -> bool:
     """Return whether the readings of a hand meter are asked for at each gap."""
     by_hand = plan.rig.meter.driver == "manual" and readings_mT is None
     return by_hand and sys.stdin.isatty()
-
-
-def ask_flux(gap_mm: float) -> float | None:
-    """Ask for the reading of a hand meter; Enter means that there is none.
-
-    Raises
-    ------
-    StoppedError
-        On Ctrl-C.
-    """
-    from ..rig.errors import StoppedError
-
-    while True:
-        try:
-            with answering():
-                text = typer.prompt(
-                    f"Tesla-meter at {gap_mm:g} mm, in mT (Enter: none)",
-                    default="", show_default=False, err=True,
-                )  # fmt: skip
-        except typer.Abort:
-            raise StoppedError("stopped by Ctrl-C") from None
-        if not text.strip():
-            return None
-        try:
-            value = float(text.replace(",", "."))
-        except ValueError:
-            value = math.nan
-        if math.isfinite(value):
-            return value
-        typer.echo(f"a reading must be a number in mT; instead received {text!r}")
 
 
 @contextlib.contextmanager
@@ -102,7 +69,7 @@ def open_bench(
         if twin_seed is None:
             devices = open_devices(
                 plan, clock, log=log, readings_mT=readings_mT, with_camera=camera,
-                ask=ask_flux if asks_flux(plan, readings_mT) else None,
+                ask=asker(plan) if asks_flux(plan, readings_mT) else None,
             )  # fmt: skip
         else:
             from ..analysis.twin.run import keep_board, open_twin_bench

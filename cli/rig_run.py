@@ -13,6 +13,7 @@ import typer
 from ..core.errors import InputError, StoreError
 from .console import print_json, progress
 from .rig_bench import asks_flux, needs_twin, open_bench
+from .rig_flux import require_plausible
 from .rig_show import print_dry_run, print_scan, print_summary
 
 if TYPE_CHECKING:
@@ -99,6 +100,8 @@ def run(
     twin_seed = _twin_seed(checked, twin, seed, readings_mT)
     if speed is not None and twin_seed is None:
         raise InputError("--speed is of the twin's clock; real time has one speed")
+    if readings_mT:
+        require_plausible(checked, readings_mT)
     summary = _carry_out(
         checked, folder, resume, readings_mT, assume_gap_mm, twin_seed, live_port, speed
     )
@@ -289,6 +292,7 @@ def _carry_out(
     live_port: int | None,
     speed: float | None,
 ) -> RunSummary:
+    from ..analysis.runs.witness import witness_of
     from ..rig.runs.control import RunControl
     from ..rig.runs.runner import run as carry_out
     from .keys import pausing, terminating
@@ -309,7 +313,7 @@ def _carry_out(
             report(f"note: {note}")
         return carry_out(
             plan, devices, folder, resume=resume, twin=twin_seed is not None,
-            control=control, report=report, progress=tell,
+            control=control, report=report, progress=tell, witness=witness_of(plan),
         )  # fmt: skip
 
 
@@ -340,4 +344,4 @@ def _watching(
 
 def _assume(devices: Devices, gap_mm: float | None) -> None:
     if gap_mm is not None:
-        devices.stage.assume_gap(gap_mm)
+        devices.stage.assume_gap(gap_mm, for_run=True)

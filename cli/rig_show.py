@@ -63,6 +63,10 @@ def print_dry_run(plan: Plan, as_json: bool) -> None:
         typer.echo(_dry_line(row))
     if plan.rig.magnet is not None:
         typer.echo(_weight(plan))
+    if plan.rig.stage.gap_at_zero_mm is None:
+        from ..rig.stage.gap import NEVER_MEASURED
+
+        typer.echo(f"note: {NEVER_MEASURED}")
     typer.echo(
         f"about {total_s / 60.0:.0f} min with homing; every gap is inside the limits; "
         f"nothing was moved"
@@ -82,8 +86,9 @@ def _weight(plan: Plan) -> str:
 
 
 def _dry_line(row: dict[str, Any]) -> str:
+    stage = "-" if row["stage_mm"] is None else f"{row['stage_mm']:.2f}"
     line = (
-        f"{row['index'] + 1:4d} {row['gap_mm']:7.2f} {row['stage_mm']:9.2f} "
+        f"{row['index'] + 1:4d} {row['gap_mm']:7.2f} {stage:>9} "
         f"{row['move_mm']:8.2f} {row['time_s']:8.1f}"
     )
     if row["predicted_flux_mT"] is None:

@@ -39,7 +39,6 @@ def register(app: typer.Typer) -> None:
         ("goto", goto, "goto 60 --rig rig.toml"),
         ("jog", jog, "jog --rig rig.toml"),
         ("unlock", unlock, "unlock --rig rig.toml"),
-        ("set-gap", set_gap, "set-gap 70.2 --rig rig.toml"),
         ("twin", twin, "twin --state board.json"),
     ):
         app.command(name, epilog=f"Example: magbend rig {example}")(command)
@@ -87,18 +86,18 @@ def status(
         else:
             typer.echo(owner_screen(held))
         return
-    with _connected("status", rig, port, log) as stage:
+    with connected("status", rig, port, log) as stage:
         if not watch:
-            data = _facts(stage)
+            data = facts(stage)
             print_json(data) if as_json else typer.echo(_screen(data))
             return
         with contextlib.suppress(KeyboardInterrupt):
             while True:
-                data = _facts(stage)
+                data = facts(stage)
                 if as_json:
                     print_json(data)
                 else:
-                    typer.echo(_line(data))
+                    typer.echo(line(data))
                 if stage.stop_requested():
                     stage.hold()
                 time.sleep(0.5)
@@ -109,11 +108,11 @@ def home(rig: RigOption = RIG, port: PortOption = None, log: LogOption = None) -
 
     A stock build homes Z first, then X and Y; Ctrl-C stops it at once.
     """
-    with _connected("home", rig, port, log) as stage:
+    with connected("home", rig, port, log) as stage:
         typer.echo("homing; Ctrl-C stops it at once", err=True)
         with _told_how_to_go_on(stage):
             stage.home()
-        typer.echo(_line(_facts(stage)))
+        typer.echo(line(facts(stage)))
 
 
 def goto(
@@ -135,7 +134,7 @@ def goto(
     """
     import dataclasses
 
-    with _connected("goto", rig, port, log) as stage:
+    with connected("goto", rig, port, log) as stage:
         stage.check_gap(gap_mm)
         if feed_mm_min is not None:
             stage.check_feed(feed_mm_min)
@@ -160,7 +159,7 @@ def jog(rig: RigOption = RIG, port: PortOption = None, log: LogOption = None) ->
     """
     from .jog_keys import jog_loop
 
-    with _connected("jog", rig, port, log) as stage:
+    with connected("jog", rig, port, log) as stage:
         jog_loop(stage)
 
 
@@ -174,7 +173,7 @@ def unlock(
 
     This sends $X: the stage may not know where it is.
     """
-    with _connected("unlock", rig, port, log) as stage:
+    with connected("unlock", rig, port, log) as stage:
         before = stage.status()
         if before.state != "alarm":
             typer.echo(f"the stage is not locked; it is {before.state}")
@@ -186,26 +185,7 @@ def unlock(
             typer.echo("still locked")
             return
         stage.unlock(confirm=True)
-        typer.echo(_line(_facts(stage)))
-
-
-def set_gap(
-    gap_mm: Annotated[float, typer.Argument(help="The measured gap, in mm.")],
-    rig: RigOption = RIG,
-    port: PortOption = None,
-    log: LogOption = None,
-) -> None:
-    """Tell the measured gap at which the stage stands.
-
-    It is written to gap_at_zero_mm of the rig file.
-    """
-    from ..rig.bench.file_edit import replace_gap_at_zero
-
-    with _connected("set-gap", rig, port, log) as stage:
-        gap_at_zero_mm = stage.assume_gap(gap_mm)
-        replace_gap_at_zero(rig, gap_at_zero_mm)
-        typer.echo(f"{rig}: gap_at_zero_mm = {gap_at_zero_mm:.3f}")
-        typer.echo(_line(_facts(stage)))
+        typer.echo(line(facts(stage)))
 
 
 def twin(
@@ -237,7 +217,7 @@ def twin(
 
 
 @contextlib.contextmanager
-def _connected(
+def connected(
     command: str, rig: Path, port: str | None, log: Path | None
 ) -> Iterator[GapStage]:
     """Yield the stage, connected; whoever asks is told that `command` holds it."""
@@ -288,7 +268,8 @@ def _told_how_to_go_on(stage: GapStage) -> Iterator[None]:
             raise RigError(f"stopped by {received.name}: {proof.sentence()}") from None
 
 
-def _facts(stage: GapStage) -> dict[str, Any]:
+def facts(stage: GapStage) -> dict[str, Any]:
+    """Return what the stage says of itself, for people and machines."""
     import dataclasses
 
     low, high = stage.range_mm()
@@ -319,13 +300,14 @@ def _screen(data: dict[str, Any]) -> str:
     }
     if data["state"] == "alarm":
         rows["to do"] = "home it (magbend rig home), or magbend rig unlock"
-    elif data["position_state"] != "homed":
-        rows["to do"] = "home it: magbend rig home"
+    elif data["doubt"]:
+        rows["to do"] = data["doubt"]
     lines = [f"{name:<10}{text}" for name, text in rows.items()]
     return "\n".join(lines + [f"note      {note}" for note in data["notes"]])
 
 
-def _line(data: dict[str, Any]) -> str:
+def line(data: dict[str, Any]) -> str:
+    """Return it in one line."""
     gap = data["gap_mm"]
     where = "gap unknown" if gap is None else f"gap {gap:.3f} mm"
     return f"{where}  {data['state']}  {data['position_state']}"

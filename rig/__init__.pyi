@@ -13,8 +13,8 @@ from .bench.config import (
 from .bench.devices import (
     Devices as Devices,
 )
-from .bench.file_edit import (
-    replace_gap_at_zero as replace_gap_at_zero,
+from .bench.measured import (
+    keep_measured_gap as keep_measured_gap,
 )
 from .bench.open import (
     open_camera as open_camera,

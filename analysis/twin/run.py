@@ -33,6 +33,7 @@ from ...vision import (
     read_photo,
     write_calibration,
 )
+from ..runs.witness import witness_of
 from .bench import HiddenTruth, TwinBench
 
 _SWING = {"swing_mm": 1.0, "swing_Hz": 2.0, "damping_s": 0.4}
@@ -112,7 +113,7 @@ def run_on_twin(
             plan, seed=seed, clock=clock, log=log, truth=truth
         )
         with closing_all(devices):
-            summary = run(plan, devices, folder, twin=True)
+            summary = run(plan, devices, folder, twin=True, witness=witness_of(plan))
     if summary.status != "success":
         raise RigError(
             f"{folder}: the run on the twin bench ended with {summary.status}: "

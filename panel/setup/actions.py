@@ -59,7 +59,7 @@ def set_rig(panel: Panel, arguments: Arguments) -> Outcome:
 
 def set_gap(panel: Panel, arguments: Arguments) -> Outcome:
     """Take a gauged gap for where the stage stands, and write it into the rig file."""
-    from ...rig import replace_gap_at_zero
+    from ...rig import keep_measured_gap
 
     gap_mm = number(arguments, "gap_mm", "mm")
     panel.require_free()
@@ -68,7 +68,7 @@ def set_gap(panel: Panel, arguments: Arguments) -> Outcome:
         if parts.stage is None:
             raise RigError(parts.problems.get("stage", "the stage is not connected"))
         zero_mm: float = parts.stage.assume_gap(gap_mm)
-        replace_gap_at_zero(panel.workspace.rig_path, zero_mm)
+        keep_measured_gap(panel.workspace.rig_path, parts.stage, gap_mm)
         return zero_mm
 
     zero_mm = panel.owner.submit("setting the gap", assume).result(timeout=10.0)

@@ -43,9 +43,17 @@ class PhotographConfig(FileModel):
 
 
 class FluxConfig(FileModel):
-    """The ``[flux]`` table: how many readings make one flux density."""
+    """The ``[flux]`` table: how many readings make one flux density, and their judge.
+
+    Each reading is held against the magnet of the rig file within `magnet_percent`, and
+    against the earlier readings of its run within `run_percent`; what disagrees is
+    flagged, and by `policy` the run pauses or ends after that step.
+    """
 
     samples: int = Field(default=5, ge=1, le=10_000)
+    policy: Literal["flag", "pause", "abort"] = "flag"
+    magnet_percent: PositiveFloat = 5.0
+    run_percent: PositiveFloat = 2.0
 
 
 class AbortConfig(FileModel):
@@ -234,12 +242,14 @@ def _why_not_there(gap_mm: float, rig: RigModel) -> tuple[str, str] | None:
         high = f"{limits.max_gap_mm:g} mm"
         return f"is beyond the largest gap of {high}", "limits.max_gap_mm"
     # Boards count from a switch, into the negative or into the positive.
-    machine_mm = abs(gap_mm - stage.gap_at_zero_mm)
-    has_switches = stage.homing == "switches"
-    if has_switches and stage.travel_mm is not None and machine_mm > stage.travel_mm:
+    zero_mm, travel_mm = stage.gap_at_zero_mm, stage.travel_mm
+    if stage.homing != "switches" or travel_mm is None or zero_mm is None:
+        return None
+    machine_mm = abs(gap_mm - zero_mm)
+    if machine_mm > travel_mm:
         return (
             f"lies {machine_mm:g} mm from the machine's zero, beyond its travel of "
-            f"{stage.travel_mm:g} mm",
+            f"{travel_mm:g} mm",
             "stage.travel_mm, gap_at_zero_mm",
         )
     return None

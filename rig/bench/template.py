@@ -23,9 +23,9 @@ driver = "grbl"            # grbl (also grblHAL, FluidNC) or marlin
 axis = "X"
 # The gap is the distance from the magnet's N face to the rod's undeformed tip:
 #     gap_mm = gap_at_zero_mm + direction * machine_mm
-# magbend rig set-gap writes gap_at_zero_mm once you have measured a gap.
-gap_at_zero_mm = 150.0
-direction = 1              # 1: the gap grows with the machine position, else -1
+# magbend rig set-gap measures both with you and writes them here. Until then the stage
+# can be homed and jogged, and nothing else.
+{zero}direction = 1              # 1: the gap grows with the machine position, else -1
 feed_mm_min = 300.0
 backlash_mm = 0.5          # every gap is approached from this much farther away
 homing = "switches"        # or "manual": you give the gap with --assume-gap-mm
@@ -123,6 +123,7 @@ def write_templates(folder: Path, *, twin: bool = False) -> tuple[Path, ...]:
     from ..meter.description import ready_meters
 
     rig = RIG.format(
+        zero="gap_at_zero_mm = 150.0     # of the computed bench\n" if twin else "",
         port=_row("port", "twin://board.json" if twin else "auto"),
         camera=_row("backend", "twin" if twin else "auto"),
         meter=_row("driver", "twin" if twin else "manual"),

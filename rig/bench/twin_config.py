@@ -10,7 +10,8 @@ from ...core.toml import FileModel
 
 FaultKind = Literal[
     "alarm 1", "alarm 2", "alarm 3", "alarm 8", "alarm 9", "restart", "unplug",
-    "silence", "deafness", "no stop", "stall", "garbage", "torn line", "hold button",
+    "silence", "deafness", "no stop", "lost steps", "stall", "garbage",
+    "torn line", "hold button",
     "camera stall", "camera dark", "meter overload", "meter silence",
 ]  # fmt: skip
 
@@ -20,7 +21,8 @@ class FaultConfig(FileModel):
 
     The moment is a time of the bench (`at_s`, from its opening), the arrival at a step
     of the plan (`at_step`, from 0), or the carriage passing a gap on its way to the
-    magnet (`at_gap_mm`); `after_s` later it strikes.
+    magnet (`at_gap_mm`); `after_s` later it strikes. `lost_mm` is what ``lost steps``
+    loses.
     """
 
     kind: FaultKind
@@ -29,6 +31,7 @@ class FaultConfig(FileModel):
     at_gap_mm: PositiveFloat | None = None
     after_s: NonNegativeFloat = 0.0
     for_s: PositiveFloat | None = None
+    lost_mm: PositiveFloat = 1.5
 
     @model_validator(mode="after")
     def _one_moment(self) -> FaultConfig:

@@ -20,8 +20,10 @@ class PlannedStep:
     ----------
     index : int
         From 0.
-    gap_mm, stage_mm : float
-        Gap, and position in the stage's own frame.
+    gap_mm : float
+        The gap.
+    stage_mm : float or None
+        Position in the stage's own frame; None on a bench that was never measured.
     move_mm : float
         Distance from the step before (from the farthest gap, for the first).
     time_s : float
@@ -30,7 +32,7 @@ class PlannedStep:
 
     index: int
     gap_mm: float
-    stage_mm: float
+    stage_mm: float | None
     move_mm: float
     time_s: float
 
@@ -48,7 +50,7 @@ def plan_steps(plan: Plan) -> tuple[PlannedStep, ...]:
     )  # fmt: skip
     acceleration = stage.acceleration_mm_s2 or 10.0
     speed_mm_s = stage.feed_mm_min / 60.0
-    here_mm = limits.max_gap_mm
+    here_mm, zero = limits.max_gap_mm, stage.gap_at_zero_mm
     steps = []
     for index, gap_mm in enumerate(plan.gaps_mm):
         move_mm = here_mm - gap_mm
@@ -59,7 +61,7 @@ def plan_steps(plan: Plan) -> tuple[PlannedStep, ...]:
                 gap_mm=gap_mm,
                 move_mm=move_mm,
                 time_s=move_s + fixed_s,
-                stage_mm=(gap_mm - stage.gap_at_zero_mm) / stage.direction,
+                stage_mm=None if zero is None else (gap_mm - zero) / stage.direction,
             )
         )
         here_mm = gap_mm

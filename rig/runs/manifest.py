@@ -42,6 +42,8 @@ def make_manifest(plan: Plan, devices: Devices, *, twin: bool) -> Record:
         "plan": plan.as_dict(),
         "specimen": specimen_dict(plan.specimen),
         "rig": plan.rig.model_dump(mode="json", exclude={"twin"}),
+        "map": devices.stage.place_map.as_dict(),
+        "assumed_gap": devices.stage.assumed,
         "devices": {
             "stage": dataclasses.asdict(devices.stage.identity),
             "stage_limits": dataclasses.asdict(devices.stage.limits),

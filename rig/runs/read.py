@@ -6,8 +6,10 @@ not of the form of a record is refused here, so that nobody after has to ask aga
 
 from __future__ import annotations
 
+import contextlib
 import logging
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,7 +18,7 @@ from ...core.checks import shown
 from ...core.door import read_file
 from ...core.errors import StoreError
 from ...core.json import parse_json, read_json
-from .records import END_FILE, RUN_FILE, SCHEMA, STEPS_FILE, Record
+from .records import AMENDMENTS_FILE, END_FILE, RUN_FILE, SCHEMA, STEPS_FILE, Record
 
 logger = logging.getLogger(__name__)
 
@@ -123,7 +125,7 @@ def read_run(path: Path) -> Run:
     for warning in warnings:
         logger.info("%s: %s", path, warning)
     return Run(
-        path=path, manifest=manifest, steps=lines.steps, end=end,
+        path=path, manifest=manifest, steps=_amended(lines.steps, path), end=end,
         warnings=tuple(warnings),
     )  # fmt: skip
 
@@ -140,6 +142,15 @@ def read_lines(path: Path) -> Lines:
     whole, newline, torn = data.rpartition(b"\n")
     lines = tuple(whole.split(b"\n")) if newline else ()
     return Lines(lines=lines, whole_bytes=len(whole) + len(newline), torn=torn)
+
+
+def read_objects(path: Path) -> Iterator[Record]:
+    """Yield the objects of a file of lines; a damaged line says nothing."""
+    for line in read_lines(path).lines:
+        with contextlib.suppress(ValueError):
+            record = parse_json(line)
+            if isinstance(record, dict):
+                yield record
 
 
 def read_steps(path: Path) -> StepLines:
@@ -249,3 +260,31 @@ def _end(path: Path) -> Record | None:
     if not well:
         raise StoreError(f"{path}: sha256 must be an object of digests")
     return record
+
+
+def _amended(steps: tuple[Record, ...], path: Path) -> tuple[Record, ...]:
+    """Return the steps with the readings that were corrected (see `amend`)."""
+    found: dict[int, Record] = {}
+    for record in read_objects(path / AMENDMENTS_FILE):
+        if type(record.get("index")) is int:
+            found[record["index"]] = record
+    return tuple(
+        {**step, **_corrected(step, found[step["index"]])}
+        if step["index"] in found
+        else step
+        for step in steps
+    )
+
+
+def _corrected(step: Record, amendment: Record) -> Record:
+    field = amendment.get("field") or {}
+    flags = [flag for flag in step.get("flags", []) if flag != "field_disagrees"]
+    return {
+        "flux_mT": amendment.get("flux_mT"),
+        "flux_sd_mT": None,
+        "flux_samples": 1,
+        "flux_status": "manual",
+        "flux_amended": True,
+        "field": field,
+        "flags": ["field_disagrees", *flags] if field.get("sentence") else flags,
+    }

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ...core.derived import FileFinding, check_derived, compare_digest, read_manifest
 from ...core.errors import StoreError
+from .map_check import map_problems
 from .read import Run, read_run
 from .records import END_FILE, IMAGES, PLAN_FILE, RUN_FILE, STEPS_FILE
 from .verify_files import check_files, check_records
@@ -45,7 +46,9 @@ def check_run(path: Path) -> RunCheck:
     except (StoreError, OSError) as error:
         return RunCheck(run=None, files=(), problems=(str(error),))
     problems = [one.sentence for one in files if one.is_problem]
-    return RunCheck(run=run, files=files, problems=(*problems, *_steps(run)))
+    return RunCheck(
+        run=run, files=files, problems=(*problems, *_steps(run), *map_problems(run))
+    )
 
 
 def verify_run(path: Path) -> list[str]:

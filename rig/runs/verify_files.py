@@ -26,6 +26,7 @@ from ...core.seal import is_whole, seal_of
 from ..wire_log import WireCheck, check_wire_log
 from .read import Run, read_lines
 from .records import (
+    AMENDMENTS_FILE,
     END_FILE,
     IMAGES,
     PLAN_FILE,
@@ -72,7 +73,7 @@ def check_records(run: Run) -> Iterator[FileFinding]:
     yield _sealed(RUN_FILE, data)
     yield compare_digest(root, PLAN_FILE, str(run.manifest.get("plan_sha256")))
     first = seal_of(data) or ""
-    for name in (STEPS_FILE, SESSIONS_FILE):
+    for name in (STEPS_FILE, SESSIONS_FILE, AMENDMENTS_FILE):
         if (root / name).exists():
             yield _chain(root / name, first)
         elif name == STEPS_FILE and (run.end or {}).get("steps"):

@@ -20,10 +20,22 @@ PositiveNumber = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
 
+class MeasuredConfig(FileModel):
+    """The table ``[stage.measured]``: what `magbend rig set-gap` found and wrote."""
+
+    gap_mm: float
+    machine_mm: float
+    direction_tested: bool = False
+    time_utc: str = ""
+    firmware: str = ""
+    settings: dict[str, str] = Field(default_factory=dict)
+
+
 class StageConfig(FileModel):
     """How the stage is reached, what its controller must be set to, and its map.
 
-    The map is ``gap_mm = gap_at_zero_mm + direction * machine_mm``.
+    The map is ``gap_mm = gap_at_zero_mm + direction * machine_mm``. Without
+    `gap_at_zero_mm` the bench was never measured: it may be homed and jogged.
     """
 
     network: bool = False
@@ -31,7 +43,7 @@ class StageConfig(FileModel):
     port: str = "auto"
     baud: int = Field(default=115200, gt=0)
     axis: Literal["X", "Y", "Z"] = "X"
-    gap_at_zero_mm: float
+    gap_at_zero_mm: float | None = None
     direction: Literal[1, -1] = 1
     feed_mm_min: PositiveNumber = 300.0
     backlash_mm: NotNegative = 0.5
@@ -50,6 +62,7 @@ class StageConfig(FileModel):
     max_feed_mm_min: PositiveNumber | None = None
     acceleration_mm_s2: PositiveNumber | None = None
     settings: dict[str, float] = Field(default_factory=dict)
+    measured: MeasuredConfig | None = None
     _folder: Path = PrivateAttr(default=Path())
 
     @property

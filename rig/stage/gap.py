@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import logging
 import math
-from dataclasses import dataclass
 from typing import Literal
 
 from ...core.checks import finite
@@ -17,55 +16,26 @@ from ...core.progress import Progress, silent
 from ..clock import Clock
 from ..errors import InterlockError, PositionLostError, StageTimeoutError
 from .config import LimitsConfig, StageConfig
+from .gap_records import Approach, GapStatus, MoveRecord
 from .interlock import check_feed, check_gap, check_homing, check_range
+from .place import PlaceMap
 from .protocol import (
     Moved,
     PositionState,
     Stage,
     StageIdentity,
     StageLimits,
-    StageState,
 )
 from .stopping import StopProof
 
 logger = logging.getLogger(__name__)
 
-Approach = Literal["far side", "clipped"]
+NEVER_MEASURED = (
+    "the gap was never measured on this bench (gap_at_zero_mm is not in the rig file): "
+    "home it, jog to a gap that you can gauge, and say it: magbend rig set-gap GAP; "
+    "until then only homing and jogging move"
+)
 AbortPolicy = Literal["hold", "retract"]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MoveRecord:
-    """How the stage came to a gap.
-
-    Attributes
-    ----------
-    gap_mm, stage_mm : float
-        Where the controller says it stands: gap and machine position, in mm.
-    duration_s : float
-        Time of the whole move.
-    approach : {"far side", "clipped"}
-        ``far side``: the last motion was toward the magnet, over the full backlash;
-        ``clipped``: a limit left too little room to come from farther away.
-    """
-
-    gap_mm: float
-    stage_mm: float
-    duration_s: float
-    approach: Approach
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GapStatus:
-    """State of the stage in one line; `gap_mm` is None when the position is unknown."""
-
-    state: StageState
-    position_state: PositionState
-    gap_mm: float | None
-    stage_mm: float | None
-    feed_mm_min: float
-    alarm: int | None
-    pins: str
 
 
 class GapStage:
@@ -91,6 +61,7 @@ class GapStage:
         self._bounds = bounds
         self._clock = clock
         self._from_far_side = False
+        self._assumed: dict[str, float] | None = None
 
     @property
     def identity(self) -> StageIdentity:
@@ -107,13 +78,45 @@ class GapStage:
         """How far the position can be trusted."""
         return self._stage.position_state
 
+    @property
+    def place_map(self) -> PlaceMap:
+        """The map by which the board's count is a gap, with all that it rests on."""
+        return self._stage.place_map
+
+    @property
+    def assumed(self) -> dict[str, float] | None:
+        """The operator's word that holds for this run only: gap and machine mm."""
+        return self._assumed
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether a gap was ever measured on this bench."""
+        return self._config.gap_at_zero_mm is not None
+
     def to_machine_mm(self, gap_mm: float) -> float:
-        """Return the machine position of a gap, both in mm."""
-        return (gap_mm - self._config.gap_at_zero_mm) / self._config.direction
+        """Return the machine position of a gap, both in mm.
+
+        Raises
+        ------
+        PositionLostError
+            If the bench was never measured.
+        """
+        return (gap_mm - self._zero_mm()) / self._config.direction
 
     def to_gap_mm(self, machine_mm: float) -> float:
-        """Return the gap of a machine position, both in mm."""
-        return self._config.gap_at_zero_mm + self._config.direction * machine_mm
+        """Return the gap of a machine position, both in mm.
+
+        Raises
+        ------
+        PositionLostError
+            If the bench was never measured.
+        """
+        return self._zero_mm() + self._config.direction * machine_mm
+
+    def _zero_mm(self) -> float:
+        if self._config.gap_at_zero_mm is None:
+            raise PositionLostError(NEVER_MEASURED)
+        return self._config.gap_at_zero_mm
 
     def connect(self) -> None:
         """Open the port, identify and audit the controller.
@@ -146,17 +149,30 @@ class GapStage:
             If the reference is not found.
         """
         switch_mm = self._stage.limits.switch_mm
-        if switch_mm is not None:
+        if switch_mm is not None and self.is_measured:
             check_homing(self.to_gap_mm(switch_mm), self._bounds)
         self._from_far_side = False
         self._stage.home()
 
-    def assume_gap(self, gap_mm: float) -> float:
+    def assume_gap(
+        self,
+        gap_mm: float,
+        *,
+        direction: Literal[1, -1] | None = None,
+        for_run: bool = False,
+    ) -> float:
         """Take the operator's word that the stage stands at `gap_mm`.
 
         The controller's count is kept; the map moves. Without switches (``homing =
         "manual"``) the position counts as ``homed`` from here; with switches the stage
         must have been homed before.
+
+        Parameters
+        ----------
+        direction : {1, -1}, optional
+            Whether the gap grows or falls with the count; by default the rig file's.
+        for_run : bool
+            The word holds for this run only: the next command does not trust it.
 
         Returns
         -------
@@ -172,19 +188,37 @@ class GapStage:
         machine_mm = self._stage.status().machine_mm
         if machine_mm is None:
             raise PositionLostError("the stage does not report a position; home it")
-        self._stage.assume_homed(machine_mm)
-        gap_at_zero_mm = gap_mm - self._config.direction * machine_mm
+        sign = direction or self._config.direction
+        gap_at_zero_mm = round(gap_mm - sign * machine_mm, 3)
+        self._stage.assume_homed(machine_mm, (gap_at_zero_mm, sign), for_run=for_run)
         self._config = self._config.model_copy(
-            update={"gap_at_zero_mm": gap_at_zero_mm}
+            update={"gap_at_zero_mm": gap_at_zero_mm, "direction": sign}
+        )
+        self._assumed = (
+            {"gap_mm": gap_mm, "stage_mm": machine_mm} if for_run else self._assumed
         )
         self._from_far_side = False
         return gap_at_zero_mm
+
+    def nudge(self, distance_mm: float) -> None:
+        """Go at most 1 mm, slowly, from wherever the stage is (machine mm).
+
+        For a stage that does not know where it is: nothing but the eye of whoever asks
+        keeps rod and magnet apart.
+
+        Raises
+        ------
+        StageError
+            If it is locked or moves already, or did not end where it should.
+        """
+        self._from_far_side = False
+        self._stage.nudge(distance_mm)
 
     def range_mm(self) -> tuple[float, float]:
         """Return the smallest and largest gap that may be asked for, in mm."""
         low, high = self._bounds.min_gap_mm, self._bounds.max_gap_mm
         travel = self._stage.limits.travel_mm
-        if travel is not None:
+        if travel is not None and self.is_measured:
             ends = sorted(self.to_gap_mm(end) for end in travel)
             low, high = max(low, ends[0]), min(high, ends[1])
         return low, high
@@ -197,7 +231,10 @@ class GapStage:
         InterlockError
             If it is nearer than `min_gap_mm`, beyond `max_gap_mm`, or outside the
             travel of the controller.
+        PositionLostError
+            If the bench was never measured.
         """
+        self._zero_mm()
         slack_mm = self._stage.limits.step_mm / 2.0
         check_gap(gap_mm, self._bounds, self.range_mm(), slack_mm)
 
@@ -267,8 +304,8 @@ class GapStage:
     def status(self) -> GapStatus:
         """Ask the controller where it is."""
         status = self._stage.status()
-        known = status.machine_mm is not None and status.position_state != "unknown"
         machine = status.machine_mm
+        known = self.is_measured and status.position_state != "unknown"
         return GapStatus(
             state=status.state,
             position_state=status.position_state,
@@ -277,6 +314,7 @@ class GapStage:
             feed_mm_min=status.feed_mm_min,
             alarm=status.alarm,
             pins=status.pins,
+            doubt=self._stage.doubt if self.is_measured else NEVER_MEASURED,
         )
 
     def listen(self) -> None:
@@ -393,9 +431,5 @@ class GapStage:
         return legs, "clipped" if clipped else "far side"
 
     def _require_homed(self) -> None:
-        state = self.position_state
-        if state != "homed":
-            raise PositionLostError(
-                f"the position of the stage is {state}; home it first "
-                "(magbend rig home), then move"
-            )
+        if self.position_state != "homed":
+            raise PositionLostError(self._stage.doubt)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 from ...core.errors import StageError
+from .place import PlaceMap
 from .stopping import StopProof
 
 PositionState = Literal["unknown", "homed", "unverified"]
@@ -76,6 +77,8 @@ class StageLimits:
         Lowest and highest machine position, if the controller is homed by switches.
     switch_mm : float or None
         Machine position of the switch that homing runs to, if there is one.
+    homed_mm : float or None
+        What the controller should count after homing, as far as its settings tell.
     """
 
     step_mm: float
@@ -83,6 +86,7 @@ class StageLimits:
     acceleration_mm_s2: float
     travel_mm: tuple[float, float] | None = None
     switch_mm: float | None = None
+    homed_mm: float | None = None
 
     @property
     def tolerance_mm(self) -> float:
@@ -111,6 +115,9 @@ class StageIdentity:
     settings: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
+
+GapMap = tuple[float, int]
+"""`gap_at_zero_mm` and `direction`."""
 
 Moved = Callable[[float], None]
 """Called with the machine position in mm, some times a second, on the way."""
@@ -150,8 +157,24 @@ class Stage(Protocol):
         """Find the reference of the axis; afterwards the position is ``homed``."""
         ...
 
-    def assume_homed(self, machine_mm: float) -> None:
-        """Take the operator's word that the controller's position is right."""
+    @property
+    def place_map(self) -> PlaceMap:
+        """The map by which its count is a gap, with all that it rests on."""
+        ...
+
+    @property
+    def doubt(self) -> str:
+        """Why the position is not trusted, and the way out; empty if it is."""
+        ...
+
+    def assume_homed(
+        self, machine_mm: float, map_: GapMap, *, for_run: bool = False
+    ) -> None:
+        """Take the operator's word for the place, and for the map there."""
+        ...
+
+    def nudge(self, distance_mm: float) -> None:
+        """Go a short way slowly, from wherever the stage is."""
         ...
 
     def move_to(

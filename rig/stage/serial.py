@@ -13,6 +13,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import Generic, TypeVar
 
+from ...core.checks import finite
 from ...core.errors import StageError
 from ..clock import Clock
 from ..errors import InterlockError, PositionLostError, StoppedError
@@ -21,14 +22,17 @@ from ..link import Link
 from ..ports import resolve_port
 from ..wire_log import WireLog
 from .config import StageConfig
+from .place import PlaceMap, difference, firmware_name, settings_that_matter
 from .presence import Presence
-from .protocol import Moved, PositionState, StageIdentity, StageLimits, unheard
+from .protocol import GapMap, Moved, PositionState, StageIdentity, StageLimits, unheard
 from .stopping import StopProof
 from .trust import Counting, PositionTrust
 
 logger = logging.getLogger(__name__)
 
 MARGIN_S = 5.0
+NUDGE_MM = 1.0
+NUDGE_FEED_MM_MIN = 60.0
 
 
 def stopped(proof: StopProof) -> str:
@@ -64,7 +68,13 @@ class SerialStage(ABC, Generic[Session]):
         self._presence: Presence | None = None
         self._identity: StageIdentity | None = None
         self._limits: StageLimits | None = None
-        self._trust = PositionTrust()
+        self._trust = PositionTrust(
+            "say where it stands first (magbend rig set-gap GAP)"
+            if config.homing == "manual"
+            else "home it first (magbend rig home)"
+        )
+        self._map_doubt = ""
+        self._is_lent = False  # the map holds for one run only
         self._is_stop_asked = False  # no Event: its lock may be held under a signal
         self._is_under_way = False
         self.last_stop: StopProof | None = None
@@ -72,7 +82,30 @@ class SerialStage(ABC, Generic[Session]):
     @property
     def position_state(self) -> PositionState:
         """How far the position can be trusted."""
+        if self._map_doubt and self._trust.state == "homed":
+            return "unverified"
         return self._trust.state
+
+    @property
+    def doubt(self) -> str:
+        """Why the position is not trusted, and the way out; empty if it is."""
+        if self._trust.state != "homed":
+            return str(self._trust.refusal())
+        return self._map_doubt
+
+    @property
+    def place_map(self) -> PlaceMap:
+        """The map by which the board's count is a gap, with all that it rests on."""
+        config, identity = self._config, self.identity
+        return PlaceMap(
+            gap_at_zero_mm=config.gap_at_zero_mm,
+            direction=config.direction,
+            axis=config.axis,
+            step_mm=self.limits.step_mm,
+            travel_mm=self.limits.travel_mm,
+            firmware=firmware_name(identity.firmware, identity.details),
+            settings=settings_that_matter(identity.settings, config.axis),
+        )
 
     @property
     def identity(self) -> StageIdentity:
@@ -220,8 +253,19 @@ class SerialStage(ABC, Generic[Session]):
 
     # --- position and motion --------------------------------------------------
 
-    def assume_homed(self, machine_mm: float) -> None:
-        """Take the operator's word that the board's count is right.
+    def assume_homed(
+        self, machine_mm: float, map_: GapMap, *, for_run: bool = False
+    ) -> None:
+        """Take the operator's word for the place, and for the map there.
+
+        Parameters
+        ----------
+        machine_mm : float
+            What the board counts.
+        map_ : tuple
+            `gap_at_zero_mm` and `direction` from here on.
+        for_run : bool
+            The word holds for this connection; the next one does not trust it.
 
         Raises
         ------
@@ -239,7 +283,25 @@ class SerialStage(ABC, Generic[Session]):
                 f"the position of the stage is {self._trust.state}; it has switches: "
                 "home it first (magbend rig home)"
             )
+        gap_at_zero_mm, direction = map_
+        self._config = self._config.model_copy(
+            update={"gap_at_zero_mm": gap_at_zero_mm, "direction": direction}
+        )
+        self._is_lent, self._map_doubt = for_run, ""
         self._trust.confirm(self._require_session())
+
+    def _compare_with_measured(self) -> None:
+        """Doubt the map if the board is not as it was when the gap was measured."""
+        measured = self._config.measured
+        if measured is None:
+            return
+        then = {"firmware": measured.firmware, "settings": measured.settings}
+        change = difference(then, self.place_map.as_dict())
+        if change:
+            self._map_doubt = (
+                f"the gap was measured on another board: {change}; undo that, or "
+                "measure the gap again (magbend rig set-gap GAP)"
+            )
 
     def _require_switches(self) -> None:
         if self._config.homing != "switches":
@@ -264,6 +326,8 @@ class SerialStage(ABC, Generic[Session]):
         """
         self._require_session()
         self._check_travel(machine_mm)
+        if self._map_doubt:
+            raise PositionLostError(self._map_doubt)
         here = self._ready_mm()
         distance = machine_mm - here
         if abs(distance) <= self.limits.step_mm / 2.0:
@@ -276,6 +340,32 @@ class SerialStage(ABC, Generic[Session]):
                     self._hold_if_asked()
                     target = here + distance * piece / pieces
                     self._move_piece(target, feed_mm_min, moved)
+        finally:
+            self._is_under_way = False
+
+    def nudge(self, distance_mm: float) -> None:
+        """Go a short way slowly, from wherever the stage is; nothing is checked.
+
+        Raises
+        ------
+        InterlockError
+            If it is more than `NUDGE_MM`; nothing was sent.
+        StageError
+            If the board moves already, is locked, or the way did not end as it should.
+        """
+        finite(distance_mm, "distance_mm", "mm")
+        if abs(distance_mm) > NUDGE_MM:
+            raise InterlockError(
+                f"a stage that does not know where it is moves at most {NUDGE_MM:g} mm "
+                f"at a time; instead received {distance_mm:g} mm; nothing was sent"
+            )
+        here = self._standing_mm()
+        self._is_under_way = True
+        try:
+            with self._stand_if_interrupted():
+                self._hold_if_asked()
+                feed = min(self._config.feed_mm_min, NUDGE_FEED_MM_MIN)
+                self._move_piece(here + distance_mm, feed, unheard)
         finally:
             self._is_under_way = False
 

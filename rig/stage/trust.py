@@ -33,9 +33,15 @@ class PositionTrust:
     ----------
     state : {"unknown", "homed", "unverified"}
         How far the position can be trusted.
+    why : str
+        What took the trust away, if that is known and not told elsewhere.
+    way_out : str
+        What gives it back.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, way_out: str = "home it first (magbend rig home)") -> None:
+        self.why = ""
+        self.way_out = way_out
         self._stood_at: Place | None = None
         self._restarts = 0
         self.state: PositionState = "unknown"
@@ -48,7 +54,7 @@ class PositionTrust:
 
     def confirm(self, session: Counting) -> None:
         """Say that the position is right, here and now."""
-        self.state = "homed"
+        self.state, self.why = "homed", ""
         self._restarts = session.restarts
         self._stood_at = session.machine()
 
@@ -56,14 +62,22 @@ class PositionTrust:
         """Note where the stage stands after a move or a hold."""
         self._stood_at = session.machine()
 
-    def doubt(self) -> None:
+    def doubt(self, why: str = "") -> None:
         """Say that something did not end as it should."""
         if self.state == "homed":
-            self.state = "unverified"
+            self.state, self.why = "unverified", why
 
-    def lose(self) -> None:
+    def lose(self, why: str = "") -> None:
         """Say that the position is lost."""
-        self.state, self._stood_at = "unknown", None
+        self.state, self._stood_at, self.why = "unknown", None, why
+
+    def refusal(self) -> PositionLostError:
+        """Return the error that says why nothing moves, and the way out."""
+        because = f" ({self.why})" if self.why else ""
+        return PositionLostError(
+            f"the position of the stage is {self.state}{because}; {self.way_out}, "
+            "then move"
+        )
 
     def note(self, session: Counting) -> None:
         """Take in whether the board restarted."""
@@ -95,7 +109,4 @@ class PositionTrust:
                 "(magbend rig home)"
             )
         if self.state != "homed":
-            raise PositionLostError(
-                f"the position of the stage is {self.state}; home it first "
-                "(magbend rig home), then move"
-            )
+            raise self.refusal()

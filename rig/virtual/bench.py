@@ -20,6 +20,7 @@ from .faults import TwinParts, schedule_faults
 from .meter import FluxAt, VirtualMeter
 from .protocol_twin import register_board
 
+_ZERO_MM = 150.0
 # Homing, hard and soft limits on, motors always on, reports with the buffer state.
 _BOARD_SETTINGS = {1: 255, 10: 3, 20: 1, 21: 1, 22: 1, 130: 180, 120: 50}
 
@@ -81,7 +82,14 @@ def open_twin(
     board = board or twin_board(kind=rig.twin.board)
     url = register_board(f"bench-{id(board):x}", board, clock)
     driver = "marlin" if isinstance(board, MarlinBoard) else "grbl"
-    config = rig.stage.model_copy(update={"driver": driver, "port": url})
+    zero = rig.stage.gap_at_zero_mm
+    own = {
+        "driver": driver,
+        "port": url,
+        "measured": None,
+        "gap_at_zero_mm": _ZERO_MM if zero is None else zero,
+    }
+    config = rig.stage.model_copy(update=own)
     stage = GapStage(make_stage(config, clock, log=log), config, rig.limits, clock)
     axis = "XYZ".index(config.axis)
 

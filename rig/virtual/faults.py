@@ -8,7 +8,7 @@ from typing import Any
 
 from ..bench.twin_config import FaultConfig
 from ..clock import Clock
-from .board.firmware import GrblBoard
+from .board.file import Board
 from .camera import VirtualCamera
 from .meter import VirtualMeter
 
@@ -27,7 +27,7 @@ _TROUBLES: dict[str, str] = {
 class TwinParts:
     """What faults strike: the devices of a twin, and its time."""
 
-    board: GrblBoard
+    board: Board
     camera: VirtualCamera
     meter: VirtualMeter
     clock: Clock
@@ -93,7 +93,7 @@ def _on_device(fault: FaultConfig, twin: TwinParts) -> Strike | None:
     return strike
 
 
-def _on_board(fault: FaultConfig, board: GrblBoard) -> Strike:
+def _on_board(fault: FaultConfig, board: Board) -> Strike:
     """Return what does the fault to the board, and mends it when its time is over."""
     for_s = fault.for_s or _EVER_S
 
@@ -112,6 +112,7 @@ def _on_board(fault: FaultConfig, board: GrblBoard) -> Strike:
         "silence": lambda: board.lose_output(for_s),
         "deafness": lambda: board.lose_input(for_s),
         "no stop": lambda: switch(board, "heeds_stops", during=False),
+        "lost steps": lambda: board.plant.lose(fault.lost_mm),
         "stall": lambda: switch(board.mover, "stalled", during=True),
         "garbage": lambda: board.send(b"\xff\x00~{\r\n"),
         "torn line": lambda: board.send(b"<Run|MP"),

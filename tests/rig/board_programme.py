@@ -84,7 +84,7 @@ class Programme:
         assert status.state == "idle", (
             f"the board is in {status.state}: home it, or let the programme do it"
         )
-        stage.assume_homed(self._here(stage))
+        stage.assume_homed(self._here(stage), (0.0, 1))
 
     def _here(self, stage: GrblStage) -> float:
         machine_mm = stage.status().machine_mm

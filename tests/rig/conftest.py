@@ -14,6 +14,7 @@ from magbend.rig.bench.config import Plan, read_plan
 from magbend.rig.bench.devices import Devices
 from magbend.rig.clock import SteppedClock
 from magbend.rig.stage.gap import GapStage
+from magbend.rig.stage.place import PlaceMap
 from magbend.rig.stage.protocol import StageIdentity, StageLimits, StageStatus
 from magbend.rig.stage.stopping import StopProof
 from magbend.rig.virtual.camera import VirtualCamera
@@ -100,8 +101,26 @@ class FakeStage:
         self.machine_mm = -1.0
         self.position_state = "homed"
 
-    def assume_homed(self, machine_mm: float) -> None:
-        self.machine_mm = machine_mm
+    zero_mm: float = 150.0
+    doubt: str = "the position of the stage is not known; home it first"
+
+    @property
+    def place_map(self) -> PlaceMap:
+        return PlaceMap(
+            gap_at_zero_mm=self.zero_mm,
+            direction=1,
+            axis="X",
+            step_mm=self.limits.step_mm,
+            travel_mm=self.limits.travel_mm,
+            firmware="0",
+            settings=self.identity.settings,
+        )
+
+    def assume_homed(
+        self, machine_mm: float, map_: tuple[float, int], *, for_run: bool = False
+    ) -> None:
+        del for_run
+        self.machine_mm, self.zero_mm = machine_mm, map_[0]
         self.position_state = "homed"
 
     def move_to(self, machine_mm: float, *, feed_mm_min: float) -> None:
@@ -125,9 +144,7 @@ class FakeStage:
     def request_stop(self) -> None:
         self.is_stop_asked = True
 
-    @property
-    def last_stop(self) -> StopProof:
-        return StopProof(means="nothing")
+    last_stop: StopProof = field(default_factory=lambda: StopProof(means="nothing"))
 
     def hold(self) -> StopProof:
         self._log("hold")

@@ -156,7 +156,7 @@ def test_help_imports_nothing_heavy() -> None:
 def test_ctrl_c_at_the_prompt_for_a_reading_stops_the_run(monkeypatch) -> None:
     import typer
 
-    from magbend.cli.rig_bench import ask_flux
+    from magbend.cli.rig_flux import ask_flux
     from magbend.rig.errors import StoppedError
 
     def press(*_arguments, **_options) -> None:

@@ -116,7 +116,7 @@ max_gap_mm = 118.0
 def test_a_session_of_jogging_by_keys(terminal, tmp_path, system_temp):
     (tmp_path / "rig.toml").write_text(RIG.format(speed=25))
     screen = terminal(ISOLATED, str(system_temp), "rig", "jog")
-    screen.wait_for("gap unknown  alarm unknown  step 1 mm")
+    screen.wait_for("gap unknown (machine 0.000 mm)  alarm unknown  step 1 mm")
     screen.type("\x1b[A")
     screen.wait_for("press H to home")
     screen.type("H")

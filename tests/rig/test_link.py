@@ -13,7 +13,7 @@ from magbend.rig.clock import ScaledClock, SteppedClock, SystemClock
 from magbend.rig.errors import LinkLostError
 from magbend.rig.link import Link
 from magbend.rig.ports import resolve_port
-from magbend.rig.stage.presence import Presence
+from magbend.rig.stage.presence import LeftPlace, Presence
 from magbend.rig.virtual.board.firmware import GrblBoard
 from magbend.rig.virtual.protocol_twin import register_board
 from magbend.rig.virtual.pty_server import PtyBoard
@@ -136,8 +136,9 @@ def test_the_same_code_talks_through_a_pseudo_terminal():
 
 def test_a_remembered_place_is_told_once():
     presence = Presence("/dev/ttyTEST")
-    presence.remember((-1.0, -2.0, -3.0))
-    assert presence.recall() == (-1.0, -2.0, -3.0)
+    left = LeftPlace(machine_mm=(-1.0, -2.0, -3.0), map={"direction": 1}, mark=17.0)
+    presence.remember(left)
+    assert presence.recall() == left
     assert presence.recall() is None
 
 

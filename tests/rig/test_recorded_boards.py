@@ -42,7 +42,7 @@ def standing(seed: int) -> tuple[RecordedBoard, GrblStage]:
     board = RecordedBoard(seed, line("G", "<Idle|MPos:-29.600"))
     stage = stage_on(board)
     stage.connect()
-    stage.assume_homed(-29.6)
+    stage.assume_homed(-29.6, (0.0, 1))
     board.on(r"\$J=G21G90G53X-30.000F300.0", lambda: jog(board))
     return board, stage
 
@@ -296,7 +296,7 @@ def test_dialects_connect_move_refuse_and_go_on(dialect, seed: int) -> None:
     dialect(board)
     stage = stage_on(board)
     stage.connect()
-    stage.assume_homed(-29.6)
+    stage.assume_homed(-29.6, (0.0, 1))
     assert stage.limits.step_mm == 0.004
     latched = False
 

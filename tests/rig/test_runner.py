@@ -90,11 +90,11 @@ def test_ctrl_c_in_each_phase_holds_and_ends_as_abort(
     elif phase == "move":
         bench.raw.before = lambda c: interrupt() if c.startswith("move -90") else None
     elif phase == "settle":
-        monkeypatch.setattr("magbend.rig.runs.runner.settle", interrupt)
+        monkeypatch.setattr("magbend.rig.runs.session.settle", interrupt)
     elif phase == "flux":
         bench.meter.read_flux = interrupt
     else:
-        monkeypatch.setattr("magbend.rig.runs.runner.grab_median", interrupt)
+        monkeypatch.setattr("magbend.rig.runs.session.grab_median", interrupt)
     summary = run(bench.plan, bench.devices, out)
     assert summary.status == "abort"
     assert bench.raw.calls[-1] == "hold"

@@ -6,8 +6,7 @@ import threading
 
 import pytest
 
-from magbend.core.errors import ConfigError, RigError
-from magbend.rig.bench.file_edit import replace_gap_at_zero
+from magbend.core.errors import RigError
 from magbend.rig.control.owner import owning
 from magbend.rig.control.state import BenchState
 from magbend.rig.stage import stop_request
@@ -65,14 +64,3 @@ def test_an_owner_that_does_not_react_is_said(tmp_path, monkeypatch):
         with pytest.raises(RigError, match="does not react"):
             stop_from_outside(rig, bench.raw._config, bench.clock)
     assert bench.stage.stop_requested()
-
-
-def test_the_rig_file_changes_in_one_number_only(tmp_path):
-    path = tmp_path / "rig.toml"
-    text = "[stage]\n  gap_at_zero_mm = 1.5e2 # here\nport = 'x'\n"
-    path.write_text(text)
-    replace_gap_at_zero(path, 99.25)
-    assert path.read_text() == text.replace("1.5e2", "99.250")
-    path.write_text("[stage]\n")
-    with pytest.raises(ConfigError, match="on a line of its own"):
-        replace_gap_at_zero(path, 1.0)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from ..config import StageConfig
 from ..protocol import StageLimits
 
 Settings = Mapping[str, str]
+Range = tuple[float, float]
 
 _AXES = "XYZ"
 _MAX_STEPS_HZ = 30_000.0
@@ -117,7 +119,7 @@ def _audit_flags(settings: Settings, config: StageConfig) -> str | None:
 def notes(settings: Settings, config: StageConfig) -> list[str]:
     """Return what the board allows but a bench should not: sentences for people."""
     found = []
-    if number(settings, "1") != 255:
+    if number(settings, "1") not in (None, 255.0):
         found.append(
             "$1 is not 255: the motors are switched off after each move and a rod or a "
             "magnet may pull the stage away; type $1=255"
@@ -137,14 +139,18 @@ def notes(settings: Settings, config: StageConfig) -> list[str]:
 
 
 def limits_of(
-    settings: Settings, details: Sequence[str], config: StageConfig
+    settings: Settings,
+    details: Sequence[str],
+    config: StageConfig,
+    told_mm: Range | None = None,
 ) -> StageLimits:
     """Return step, ceilings and travel of the axis, after the audit passed.
 
     A GRBL that homes by switches counts from 0 at the upper switches into the negative,
     whichever side it homes to; one built (``Z`` in ``[OPT:``) or set to call the homed
-    place 0 counts from there. The last millimetres before the switch, over which homing
-    pulls off, are left alone: a switch that closes there is an alarm.
+    place 0 counts from there; `homed_at_mm` of the rig file, or a range that the board
+    tells (`told_mm`), go before that. The last millimetres before the switch, over
+    which homing pulls off, are left alone: a switch that closes there is an alarm.
     """
     index = _AXES.index(config.axis)
     steps, feed, acceleration, travel = (
@@ -152,19 +158,49 @@ def limits_of(
     )
     pull_off = number(settings, "27") or 0.0
     downward = int(number(settings, "23") or 0) >> index & 1
-    origin_zero = "Z" in _options(details) or _homing_bits(settings) & 8
-    homed = 0.0 if origin_zero else pull_off - travel if downward else -pull_off
-    homed = homed if config.homed_at_mm is None else config.homed_at_mm
-    away = travel - pull_off
-    switch, far = (-pull_off, away) if downward else (pull_off, -away)
-    by_switches = config.homing == "switches"
-    return StageLimits(
+    limits = StageLimits(
         step_mm=1.0 / steps,
         max_feed_mm_min=feed,
         acceleration_mm_s2=acceleration,
-        travel_mm=_span(homed, homed + far) if by_switches else None,
-        switch_mm=homed + switch if by_switches else None,
     )
+    homed = _homed_mm(settings, details, config, told_mm)
+    if config.homing != "switches" or homed is None:
+        return limits
+    away = travel - pull_off
+    switch, far = (-pull_off, away) if downward else (pull_off, -away)
+    return replace(
+        limits,
+        travel_mm=_span(homed, homed + far),
+        switch_mm=homed + switch,
+        homed_mm=homed,
+    )
+
+
+def _homed_mm(
+    settings: Settings,
+    details: Sequence[str],
+    config: StageConfig,
+    told_mm: Range | None,
+) -> float | None:
+    """Return what the board counts after homing; None if nothing tells."""
+    index = _AXES.index(config.axis)
+    downward = int(number(settings, "23") or 0) >> index & 1
+    if config.homed_at_mm is not None:
+        return config.homed_at_mm
+    if told_mm is not None:
+        return told_mm[0] if downward else told_mm[1]
+    if is_fluidnc(details):
+        return None  # its configuration file says, and the board was silent
+    if "Z" in _options(details) or _homing_bits(settings) & 8:
+        return 0.0
+    travel = number(settings, f"{130 + index}") or math.nan
+    pull_off = number(settings, "27") or 0.0
+    return pull_off - travel if downward else -pull_off
+
+
+def is_fluidnc(details: Sequence[str]) -> bool:
+    """Return whether the version names FluidNC: it keeps no ``$27`` and other rules."""
+    return any("FluidNC" in text for text in details)
 
 
 def _span(one: float, other: float) -> tuple[float, float]:

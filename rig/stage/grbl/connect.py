@@ -9,6 +9,8 @@ from ....core.errors import StageError
 from ...clock import Clock
 from ...errors import StageTimeoutError
 from ..config import StageConfig
+from .audit import is_fluidnc, number
+from .mark import read_mark
 from .protocol import Message, Report, Setting
 from .session import CommandRefusedError, GrblSession
 from .stopping import stop_motion
@@ -32,12 +34,18 @@ class FoundBoard:
     undisturbed : bool
         The board had been standing idle and did not restart on opening: if it was
         homed before, it still is.
+    mark : float or None
+        What it was marked with when it was left (see `mark`); None if it was not.
+    told_mm : tuple of float or None
+        The travel of the axis, if the firmware tells it by itself.
     """
 
     banner: str
     details: tuple[str, ...]
     settings: Mapping[str, str]
     undisturbed: bool
+    mark: float | None = None
+    told_mm: tuple[float, float] | None = None
 
 
 def connect_board(
@@ -57,6 +65,7 @@ def connect_board(
         axis = "XYZ".index(config.axis)
         stop_motion(session, clock, axis=axis)  # an earlier program left it moving
         report = session.report
+    mark = read_mark(session) if undisturbed else None  # a reset clears it
     if config.reset_on_connect or report is None or report.state != "idle":
         _reset(session, config)
     _refuse_open_door(session)
@@ -77,13 +86,39 @@ def connect_board(
             f"the board ({session.banner or 'no banner'}) answers, but sends no status "
             "report as GRBL 1.1 does; older versions cannot jog ($J=): update it"
         )
+    told = config.homing == "switches" and config.homed_at_mm is None
     version = next((d for d in details if d.startswith("VER:")), "unknown firmware")
     return FoundBoard(
         banner=session.banner or version,
         details=details,
         settings=settings,
         undisturbed=undisturbed,
+        mark=mark,
+        told_mm=_told_mm(session, details, settings, config.axis) if told else None,
     )
+
+
+def _told_mm(
+    session: GrblSession,
+    details: tuple[str, ...],
+    settings: Mapping[str, str],
+    axis: str,
+) -> tuple[float, float] | None:
+    """Return the travel that the firmware tells: FluidNC alone does, in two ways."""
+    if axis in session.ranges or not is_fluidnc(details):
+        return session.ranges.get(axis)
+    travel = number(settings, f"{130 + 'XYZ'.index(axis)}")
+    name = f"/axes/{axis.lower()}/homing/mpos_mm"
+    try:
+        lines = session.command(f"${name}")
+    except CommandRefusedError:
+        return None
+    told = {s.name: s.value for s in lines if isinstance(s, Setting)}
+    homed = number(told, name)
+    if homed is None or travel is None:
+        return None
+    downward = int(number(settings, "23") or 0) >> "XYZ".index(axis) & 1
+    return (homed, homed + travel) if downward else (homed - travel, homed)
 
 
 def _first_report(

@@ -197,7 +197,7 @@ Line = Ok | Refusal | Alarm | Banner | Message | Setting | Report | Other
 _STATES = {
     "idle", "run", "hold", "jog", "alarm", "home", "check", "door", "sleep",
 }  # fmt: skip
-_BANNER = re.compile(r"^(Grbl|GrblHAL)\s+\S+\s+\[")
+_BANNER = re.compile(r"^(Grbl\s+\S+\s.*\[|.*\['\$'.*help\]\s*$)", re.IGNORECASE)
 _SETTING = re.compile(r"^\$([A-Za-z0-9/_\-]+)=(.*?)(?:\s+\(.*\))?$")  # comment
 _MESSAGE = re.compile(r"^\[([A-Z0-9 +]+):(.*)\]$")
 

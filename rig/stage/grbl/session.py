@@ -8,6 +8,7 @@ them back: replies count anew from the banner.
 from __future__ import annotations
 
 import logging
+import re
 
 from ....core.errors import StageError
 from ...clock import Clock
@@ -21,6 +22,7 @@ from .protocol import (
     Line,
     Message,
     Ok,
+    Other,
     Refusal,
     Report,
     Triple,
@@ -29,6 +31,9 @@ from .protocol import (
     machine_position,
     parse_line,
 )
+
+# FluidNC: "INFO: Axis X (0.000,180.000)"
+_AXIS_RANGE = re.compile(r"Axis ([XYZ]) \((-?[\d.]+),\s*(-?[\d.]+)\)")
 
 logger = logging.getLogger(__name__)
 
@@ -63,6 +68,8 @@ class GrblSession:
         Banners that nobody had asked for.
     in_step : bool
         Whether replies can be matched with lines.
+    ranges : dict
+        What the board told of the travel of its axes, by letter, in mm.
     """
 
     def __init__(self, link: Link, clock: Clock, *, answer_timeout_s: float) -> None:
@@ -74,9 +81,10 @@ class GrblSession:
         self.report: Report | None = None
         self.alarm: int | None = None
         self.restarts = 0
-        self.banner = ""
+        self.banner = self._own_banner = ""
         self.in_step = True
         self.locked_message = False
+        self.ranges: dict[str, tuple[float, float]] = {}
 
     @property
     def deaf(self) -> bool:
@@ -212,6 +220,7 @@ class GrblSession:
 
     def _reset_once(self) -> bool:
         self._link.write_realtime(SOFT_RESET)
+        said: list[str] = []
         deadline_s = self._clock.monotonic_s() + _BANNER_S
         while (left_s := deadline_s - self._clock.monotonic_s()) > 0.0:
             line = self.pump(left_s)
@@ -221,7 +230,21 @@ class GrblSession:
                 return True
             if isinstance(line, Message) and "Reset to continue" in line.text:
                 return False
-        return False
+            if isinstance(line, Other):
+                said.append(line.text)
+        return self._has_own_words(said)
+
+    def _has_own_words(self, said: list[str]) -> bool:
+        """Take what followed a reset for a start-up line, if a report follows it.
+
+        Its words are the maker's choice; what counts is that it answers as GRBL 1.1.
+        """
+        report = self.ask() if said else None
+        if report is None or report.state not in ("idle", "alarm"):
+            return False
+        self.banner = self._own_banner = said[-1]
+        self._offset, self.in_step = None, True
+        return True
 
     def _note(self, line: Line) -> Line:
         if isinstance(line, Report):
@@ -237,6 +260,16 @@ class GrblSession:
             self.in_step = True
             if not self._reset_pending:
                 self.restarts += 1
-        elif isinstance(line, Message) and "unlock" in line.text:
-            self.locked_message = "to unlock" in line.text
+        elif isinstance(line, Other) and line.text == self._own_banner:
+            return self._note(Banner(line.text))
+        elif isinstance(line, Message):
+            self._note_message(line.text)
         return line
+
+    def _note_message(self, text: str) -> None:
+        if "unlock" in text:
+            self.locked_message = "to unlock" in text
+        axis = _AXIS_RANGE.search(text)
+        if axis:
+            low, high = sorted((float(axis.group(2)), float(axis.group(3))))
+            self.ranges[axis.group(1)] = (low, high)

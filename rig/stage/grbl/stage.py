@@ -20,11 +20,14 @@ from ...errors import (
     StoppedError,
 )
 from ...link import Link
+from ..place import difference
+from ..presence import LeftPlace
 from ..protocol import Moved, StageIdentity, StageStatus
 from ..serial import SerialStage, stopped
 from ..stopping import StopProof
 from . import audit as grbl_audit
 from .connect import FoundBoard, connect_board
+from .mark import set_mark
 from .motion import Target, await_arrival, await_homing, stands
 from .protocol import SOFT_RESET, Report, alarm_text, jog_line
 from .ready import (
@@ -37,6 +40,8 @@ from .ready import (
 )
 from .session import CommandRefusedError, GrblSession
 from .stopping import reset_motion, stop_motion
+
+_HOMED_SLACK_MM = 0.02
 
 
 class GrblStage(SerialStage[GrblSession]):
@@ -63,7 +68,9 @@ class GrblStage(SerialStage[GrblSession]):
     def _take_in(self, session: GrblSession, found: FoundBoard, port: str) -> None:
         """Keep what the board said; believe its position if nobody disturbed it."""
         config = self._config
-        self._limits = grbl_audit.limits_of(found.settings, found.details, config)
+        self._limits = grbl_audit.limits_of(
+            found.settings, found.details, config, found.told_mm
+        )
         self._identity = StageIdentity(
             driver="grbl",
             firmware=found.banner,
@@ -74,10 +81,27 @@ class GrblStage(SerialStage[GrblSession]):
         )
         self._trust.watch(session)
         self._undisturbed = found.undisturbed
-        left_at = self._presence.recall() if self._presence else None
-        where = left_at if found.undisturbed else None
-        if where and self._trust.is_at(session, where, self._limits.tolerance_mm):
+        self._map_doubt, self._is_lent = "", False
+        self._compare_with_measured()
+        left = self._presence.recall() if self._presence else None
+        if left is not None:
+            self._recall(session, found, left)
+
+    def _recall(self, session: GrblSession, found: FoundBoard, left: LeftPlace) -> None:
+        """Trust the place where the stage was left, if all signs are for it."""
+        tolerance_mm = self.limits.tolerance_mm
+        by_hand = self._config.homing == "manual"
+        change = difference(left.map, self.place_map.as_dict())
+        if not found.undisturbed:
+            return
+        if not self._trust.is_at(session, left.machine_mm, tolerance_mm):
+            self._trust.lose("the board counts another place than where it was left")
+        elif found.mark != left.mark or (by_hand and left.mark is None):
+            self._trust.lose("the board was restarted since the stage was left")
+        else:
             self._trust.confirm(session)
+            if change:
+                self._trust.doubt(f"since the stage was left, {change}")
 
     def home(self) -> None:
         """Run the homing cycle of the board and wait for its end.
@@ -110,7 +134,29 @@ class GrblStage(SerialStage[GrblSession]):
         if report.state != "idle":
             raise StageError(f"after homing the stage is in {report.state}, not idle")
         session.alarm = None
+        self._require_counted_as_computed()
         self._trust.confirm(session)
+
+    def _require_counted_as_computed(self) -> None:
+        """Refuse a homing after which the board counts from elsewhere.
+
+        Raises
+        ------
+        PositionLostError
+            If it does: by its own count it would drive past the end of the axis.
+        """
+        homed, here = self.limits.homed_mm, self._machine_mm()
+        if here is None:
+            raise PositionLostError("the stage does not report its position; home it")
+        slack_mm = self.limits.tolerance_mm + _HOMED_SLACK_MM
+        if homed is not None and abs(here - homed) > slack_mm:
+            self._trust.lose("homing did not end where it was computed to")
+            raise PositionLostError(
+                f"the board counts {here:.3f} mm after homing, {homed:.3f} mm was "
+                "expected from its settings ($23, $27, $130): nothing moves by a count "
+                "that is not understood; if this is its way, write homed_at_mm = "
+                f"{here:g} into [stage] of the rig file"
+            )
 
     def _stop_homing_if_asked(self) -> None:
         if self.stop_requested():
@@ -152,7 +198,7 @@ class GrblStage(SerialStage[GrblSession]):
             state=state,  # type: ignore[arg-type]
             substate=report.substate if report else None,
             machine_mm=self._machine_mm() if report or session.deaf else None,
-            position_state=self._trust.state,
+            position_state=self.position_state,
             feed_mm_min=report.feed if report else 0.0,
             alarm=code,
             trouble=session.alarm_error(code) if code is not None else None,
@@ -286,8 +332,15 @@ class GrblStage(SerialStage[GrblSession]):
                 note(session, self._trust)
                 machine = session.machine()
                 idle = report is not None and report.state == "idle"
-                if self._trust.state == "homed" and idle and machine:
-                    presence.remember(machine)
+                trusted = self.position_state == "homed" and not self._is_lent
+                if trusted and idle and machine:
+                    presence.remember(
+                        LeftPlace(
+                            machine_mm=machine,
+                            map=self.place_map.as_dict(),
+                            mark=set_mark(session),
+                        )
+                    )
         self._let_go()
 
     def _move_piece(self, target_mm: float, feed_mm_min: float, moved: Moved) -> None:

@@ -56,6 +56,8 @@ class MarlinStage(SerialStage[MarlinSession]):
             driver="marlin", firmware=firmware, port=link.port, details=tuple(lines)
         )
         self._trust.watch(session)
+        self._map_doubt, self._is_lent = "", False
+        self._compare_with_measured()
         return session
 
     def home(self) -> None:
@@ -107,7 +109,7 @@ class MarlinStage(SerialStage[MarlinSession]):
         return StageStatus(
             state="idle" if trouble is None else "alarm" if lost else "silent",
             machine_mm=here,
-            position_state=self._trust.state,
+            position_state=self.position_state,
             trouble=trouble if lost else None,
         )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 from ....core.errors import StageError
@@ -63,12 +64,14 @@ def load_board(path: Path | None, kind: str = "grbl") -> Board:
         position = [int(steps) for steps in state["position"]]
         locked = bool(state["locked"])
         dialect = DIALECTS[state.get("dialect", "grbl")]
+        feed_mm_min = float(state.get("feed_mm_min", 0.0))
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise StageError(f"{path}: is no file of a virtual board: {error}") from None
     board = GrblBoard(Plant(start_mm=(x, y, z)), settings, dialect)
     board.advance(0.1)
     board.position = position
     board.assume_position(locked=locked)
+    board.modal = replace(board.modal, feed_mm_min=feed_mm_min)
     return board
 
 
@@ -83,5 +86,6 @@ def save_board(board: Board, path: Path) -> None:
         "carriage_mm": board.plant.carriage_mm,
         "position": board.position,
         "locked": board.state == "Alarm",
+        "feed_mm_min": board.modal.feed_mm_min,
     }
     write_text(path, json.dumps(state, indent=1) + "\n")

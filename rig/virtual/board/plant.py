@@ -44,6 +44,7 @@ class Plant:
         self._low_mm = switch_low_mm
         self._play_mm = finite(backlash_mm, "backlash_mm", "mm")
         self._steps = [0, 0, 0]
+        self._lost_steps = 0
         self._carriage_mm = list(start_mm)
         self._watchers: list[Callable[[], None]] = []
         self.stuck = False
@@ -60,8 +61,15 @@ class Plant:
         x, y, z = self._carriage_mm
         return (x, y, z)
 
+    def lose(self, distance_mm: float) -> None:
+        """Lose the next steps of whichever motor turns, over so many mm."""
+        self._lost_steps += round(distance_mm * self._steps_per_mm)
+
     def step(self, axis: int, count: int) -> None:
         """Turn a motor by `count` steps (signed)."""
+        lost = min(self._lost_steps, abs(count))
+        self._lost_steps -= lost
+        count -= lost if count > 0 else -lost
         self._steps[axis] += count
         screw = self._start_mm[axis] + self._steps[axis] / self._steps_per_mm
         half = self._play_mm / 2.0

@@ -1,0 +1,44 @@
+"""Keep a measured gap: the map and the board it holds for, in the rig file."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+from ...core.checks import finite
+from ..stage.gap import GapStage
+from .file_edit import write_measured_gap
+
+
+def keep_measured_gap(
+    rig_file: Path, stage: GapStage, gap_mm: float, *, direction_tested: bool = False
+) -> None:
+    """Write where the stage stands, after `GapStage.assume_gap`, into the rig file.
+
+    Parameters
+    ----------
+    rig_file : Path
+        Its ``gap_at_zero_mm``, ``direction`` and ``[stage.measured]`` are written.
+    stage : GapStage
+        Connected, standing at the gap.
+    gap_mm : float
+        The gap that was gauged, in mm.
+    direction_tested : bool
+        Whether somebody saw which way the stage goes.
+
+    Raises
+    ------
+    ConfigError
+        If the file has no table ``[stage]`` of its own.
+    """
+    map_ = stage.place_map
+    zero_mm = finite(map_.gap_at_zero_mm, "gap_at_zero_mm", "mm")
+    measured = {
+        "gap_mm": gap_mm,
+        "machine_mm": stage.status().stage_mm,
+        "direction_tested": direction_tested,
+        "time_utc": f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}",
+        "firmware": map_.firmware,
+        "settings": dict(map_.settings),
+    }
+    write_measured_gap(rig_file, zero_mm, map_.direction, measured)
