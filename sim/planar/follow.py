@@ -14,8 +14,8 @@ import math
 import numpy as np
 
 from ...core.jit import njit
-from ..magnet.flux import PART, blocked
-from .march import MAX_ORDER, STATE, march
+from ..magnet.flux import PART, blocked, field_at
+from .march import MAX_ORDER, SPARED, STATE, SWING, M, march
 
 SHRINK = 0.25
 """How each correction must shrink, as the theorem of Kantorovich asks for."""
@@ -68,6 +68,64 @@ def residual(u, clamp, X):  # type: ignore[no-untyped-def]
     )
 
 
+@njit(**PART)
+def correction(clamp, u, X, D, d):  # type: ignore[no-untyped-def]
+    """Set d to Newton's correction (of gamma, x_L, y_L, theta_L) after a march at u.
+
+    Return the residual, infinite if the matrix is singular. Along a long rod the angle
+    from the load grows as a pendulum's does: tan(angle / 4) at the root is nearly
+    proportional to that at the tip (`planar.one_sided`). So Newton runs on tan(theta /
+    4) of the root; of the angle itself it would see only the bend.
+    """
+    rt, rx, ry = residual(u, clamp, X)
+    turn = rt
+    goal = clamp - u[3]
+    if abs(X[0]) < 3.0 and abs(goal) < 3.0:
+        c = math.cos(0.25 * X[0])
+        turn = 4.0 * c * c * (math.tan(0.25 * X[0]) - math.tan(0.25 * goal))
+    if not solve3(D, turn, rx, ry, d):
+        return math.inf
+    d[0] -= D[SPARED, 1] * d[1] + D[SPARED, 2] * d[2]
+    d[3] = d[0] + D[SWING, 1] * d[1] + D[SWING, 2] * d[2]
+    return abs(rt) + abs(rx) + abs(ry)
+
+
+@njit(**PART)
+def _tangent(D, d):  # type: ignore[no-untyped-def]
+    """Set d to what gamma, x_L and y_L do per load, after the march of a solution."""
+    solve3(D, D[0, 3], D[2, 3], D[3, 3], d)
+    d[0] -= D[SPARED, 1] * d[1] + D[SPARED, 2] * d[2] + D[SPARED, 3]
+
+
+@njit(**PART)
+def move(rod, field, step, d, u):  # type: ignore[no-untyped-def]
+    """Move the tip by `step` times d = (gamma, x, y), the frame with its load."""
+    u[1] += step * d[1]
+    u[2] += step * d[2]
+    b = field_at(field, u[1], u[2])
+    if rod[0, M] != 0.0 and (b[0] != 0.0 or b[1] != 0.0):
+        sign = -1.0 if rod[0, M] < 0.0 else 1.0
+        turn = math.atan2(sign * b[1], sign * b[0]) - u[3]
+        u[3] += turn - 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
+    turn = step * d[0]
+    if abs(turn) < abs(u[0]) < 0.1:
+        u[0] *= math.exp(turn / u[0])
+    else:
+        u[0] += turn
+
+
+@njit(**PART)
+def face(rod, field, u):  # type: ignore[no-untyped-def]
+    """Turn the frame into the load at the tip, keeping the tip's direction."""
+    b = field_at(field, u[1], u[2])
+    if rod[0, M] != 0.0 and (b[0] != 0.0 or b[1] != 0.0):
+        sign = -1.0 if rod[0, M] < 0.0 else 1.0
+        turn = math.atan2(sign * b[1], sign * b[0]) - u[3]
+        turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
+        u[3] += turn
+        u[0] -= turn
+
+
 @njit(cache=True, error_model="numpy")
 def straight(clamp, u):  # type: ignore[no-untyped-def]
     """Set u to the unloaded rod, keeping its frame."""
@@ -83,7 +141,7 @@ def newton(rod, field, load, clamp, u, order, step, first, X, D, T, C):  # type:
     Gives up, rather than jump to another branch, when the first correction is above
     `first` or a correction does not shrink to a quarter of the one before.
     """
-    d = np.empty(3)
+    d = np.empty(4)
     nowhere = np.empty(0)
     nothing = np.empty((4, 0))
     before = math.inf
@@ -95,14 +153,12 @@ def newton(rod, field, load, clamp, u, order, step, first, X, D, T, C):  # type:
             rod, field, load, u, order, step, columns, math.inf, nowhere, 0,
             X, D, T, C, nothing,
         )  # fmt: skip
-        rt, rx, ry = residual(u, clamp, X)
-        if not solve3(D, rt, rx, ry, d):
+        if not correction(clamp, u, X, D, d) < math.inf:
             return -1
         size = max(abs(d[0]), abs(d[1]), abs(d[2]))
         if not size < SMALL and (not size < first or size > SHRINK * before):
             return -1
-        for i in range(3):
-            u[i] += d[i]
+        move(rod, field, 1.0, d, u)
         if size < SMALL:
             return index
         before = size
@@ -122,15 +178,16 @@ def follow_load(rod, field, clamp, u, order, step):  # type: ignore[no-untyped-d
     tangent = np.zeros(3)
     u[3] = 0.0
     straight(clamp, u)
+    face(rod, field, u)
     here = u.copy()
     trials = 0
     index = 0
     load = 0.0
     jump = 0.0
     while True:
-        for i in range(3):
-            u[i] = here[i] + jump * tangent[i]
-        u[3] = here[3]
+        for i in range(4):
+            u[i] = here[i]
+        move(rod, field, jump, tangent, u)
         bend = jump * max(abs(tangent[0]), abs(tangent[1]), abs(tangent[2]))
         trial = -1
         if bend < 0.5:
@@ -145,7 +202,7 @@ def follow_load(rod, field, clamp, u, order, step):  # type: ignore[no-untyped-d
             load += jump
             for i in range(4):
                 here[i] = u[i]
-            solve3(D, D[0, 3], D[2, 3], D[3, 3], tangent)
+            _tangent(D, tangent)
             jump = 2.0 * jump if jump > 0.0 else 0.25
         else:
             jump *= 0.5

@@ -19,7 +19,7 @@ A rod is an array (n, 5), tip first: length h, compliance e, magnetic load m per
 and weight per length wx, wy. A field is an array of its own (`magnet.flux`). The state
 X, shape (11,), holds theta, q, x, y, Px, Py, what acts within a section: e, wx, wy, and
 the flux density at the tip. The columns D, shape (11, 4), hold derivatives of the first
-nine.
+nine (and see `SPARED`).
 
 The kernels are parts (`PART`) of the few that Python calls, each of which holds one
 march in one place: every further place would be compiled and optimised again.
@@ -36,6 +36,11 @@ H, E, M, WX, WY = 0, 1, 2, 3, 4
 """Columns of a rod."""
 STATE = 11
 """Length of the state and rows of the column array."""
+SPARED, SWING = 9, 10
+"""Rows of the column array that hold no derivative: how much of the first column the
+others were spared (`spare`), and how the tip's load swings with its place."""
+GROWN = 1e16
+"""Square of the growth from which on `spare` has something to do."""
 MAX_ORDER = 24
 MOST_STEPS = 1500
 """Most steps of a section; more is asked for only where an iteration runs away."""
@@ -241,6 +246,39 @@ def turn_frame(b, scale, u, X, columns, D):  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
+def _hold_gamma(b, D):  # type: ignore[no-untyped-def]
+    """Make the columns of x_L and y_L those at a fixed gamma, as the load swings.
+
+    At a fixed direction of the tip they would be those of gamma, nearly, times what
+    the load swings: gamma grows exponentially along a long rod, and drowns the rest.
+    """
+    size2 = b[0] * b[0] + b[1] * b[1]
+    if size2 > 0.0:
+        D[0, 1] = D[SWING, 1] = (b[0] * b[3] - b[1] * b[2]) / size2
+        D[0, 2] = D[SWING, 2] = (b[0] * b[4] - b[1] * b[3]) / size2
+
+
+@njit(**PART)
+def spare(X, D):  # type: ignore[no-untyped-def]
+    """Free the other columns from what has grown in them of the first.
+
+    Determinants stay, and so do the solutions of linear systems, but for their first
+    unknown, from which the row `SPARED` times the others is to be taken (Godunov's
+    orthogonalisation of growing solutions, 1961).
+    """
+    e = X[6]
+    w = e * e / (1.0 + e * math.hypot(X[4], X[5]))
+    size2 = D[0, 0] * D[0, 0] + w * D[1, 0] * D[1, 0]
+    if size2 < GROWN:
+        return
+    for a in range(1, 4):
+        c = (D[0, 0] * D[0, a] + w * D[1, 0] * D[1, a]) / size2
+        D[SPARED, a] += c
+        for k in range(6):
+            D[k, a] -= c * D[k, 0]
+
+
+@njit(**PART)
 def add_load(rod, field, i, load, u, columns, X, D):  # type: ignore[no-untyped-def]
     """Add the load m B(r) where section `i` begins, seen from the tip.
 
@@ -258,6 +296,8 @@ def add_load(rod, field, i, load, u, columns, X, D):  # type: ignore[no-untyped-
     b = field_at(field, x, y)
     if i == 0:
         turn_frame(b, load * m, u, X, columns, D)
+        if columns > 1 and m != 0.0:
+            _hold_gamma(b, D)
         cf = math.cos(u[3])
         sf = math.sin(u[3])
     along = cf * b[0] + sf * b[1]
@@ -326,7 +366,8 @@ def march(rod, field, load, u, order, step, columns, limit, s, count, X, D, T, C
     order, step : int, float
         Order of the series, and what one step takes (`substeps`).
     columns : int
-        0: none, and D is kept. 1: d/dgamma. 4: also d/dx_L, d/dy_L and d/dload.
+        0: none, and D is kept. 1: d/dgamma. 4: also d/dx_L and d/dy_L (at a fixed
+        gamma) and d/dload.
     limit : float
         Angle from the load at which the march stops.
     s, count : ndarray, int
@@ -365,6 +406,8 @@ def march(rod, field, load, u, order, step, columns, limit, s, count, X, D, T, C
             if columns > 0:
                 column_step(h, order, X, T, D, C)
             advance(h, order, X, T)
+            if columns > 1:
+                spare(X, D)
             if columns > 0 and (jacobi(D, columns) > 0.0) != positive:
                 positive = not positive
                 zeros += 1

@@ -24,9 +24,18 @@ from ...core.errors import InputError, SolverError
 from ...core.jit import njit
 from ...core.specimen import Specimen
 from ..fields import Field, gap_of
-from ..magnet.flux import PART, blocked, in_reach, is_uniform
+from ..magnet.flux import PART, blocked, field_at, in_reach, is_uniform
 from .contact import load_before_touching, touches_in_plane
-from .follow import SHRINK, SMALL, follow_load, residual, solve3, straight
+from .follow import (
+    SHRINK,
+    SMALL,
+    correction,
+    follow_load,
+    move,
+    residual,
+    solve3,
+    straight,
+)
 from .march import MAX_ORDER, STATE, WX, WY, E, H, M, march
 from .one_sided import first_guess, narrow, one_sided
 
@@ -70,17 +79,22 @@ def _reach(rod, flux):  # type: ignore[no-untyped-def]
     return reach
 
 
+@njit(cache=True, error_model="numpy")
+def reach_there(rod, field, u):  # type: ignore[no-untyped-def]
+    """Return the rod's length in boundary layers in the field at the tip in `u`."""
+    b = field_at(field, u[1], u[2])
+    return _reach(rod, math.hypot(b[0], b[1]))
+
+
 @njit(**PART)
 def _correct(columns, clamp, u, X, D, d):  # type: ignore[no-untyped-def]
     """Set d to Newton's correction; return the residual (infinite if singular)."""
-    rt, rx, ry = residual(u, clamp, X)
     if columns == 1:
-        d[0] = -rt / D[0, 0]
+        rt = residual(u, clamp, X)[0]
+        d[0] = d[3] = -rt / D[0, 0]
         d[1] = d[2] = 0.0
         return abs(rt)
-    if not solve3(D, rt, rx, ry, d):
-        return math.inf
-    return abs(rt) + abs(rx) + abs(ry)
+    return correction(clamp, u, X, D, d)
 
 
 @njit(**PART)
@@ -159,7 +173,7 @@ def _solve_row(  # type: ignore[no-untyped-def]
             if stage == SHAPE:
                 done = error >= 0.0
                 if not done:
-                    error = size + abs(d[0]) + abs(d[1]) + abs(d[2])
+                    error = size + abs(d[3]) + abs(d[1]) + abs(d[2])
                     if simple:  # whose residual is the angle's alone
                         error += abs(X[2] - x) + abs(X[3] - y)
                     done = error < ENOUGH
@@ -176,8 +190,10 @@ def _solve_row(  # type: ignore[no-untyped-def]
                 ):
                     break
                 before = change
-            for a in range(3):
-                u[a] += d[a]
+            if simple:
+                u[0] += d[0]
+            else:
+                move(rod, field, 1.0, d, u)
         if done:
             stage += 1
             index = zeros
@@ -249,7 +265,7 @@ def solve_rows(rods, fields, clamp, margins, s, order, step, cold, u, found, out
     D = np.empty((STATE, 4))
     T = np.empty((4, MAX_ORDER + 1))
     C = np.empty((MAX_ORDER + 1, 4, 4))
-    d = np.empty(3)
+    d = np.empty(4)
     found[:, 1] = -1.0
     found[:, 6] = 0.0
     for i in range(rods.shape[0]):
@@ -314,6 +330,8 @@ def _solve_by_following(
     else:
         found[0, 0] = GONE if index == -1 else FAILED
         found[0, 6] = load
+        if index == -2 and reach_there(rods[0], fields[0], u[0]) > MAX_REACH_NEWTON:
+            found[0, 0] = TOO_STRONG
 
 
 def _load_before_touching(end: float, rod: Array, *rest: Any) -> float:

@@ -1,0 +1,72 @@
+"""Attracted rods, whose tips near the magnet, are followed to an answer."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from magbend.core.magnet import Magnet
+from magbend.sim import (
+    Coil,
+    Field,
+    MagnetField,
+    Rod,
+    Section,
+    solve,
+    solve_many,
+    solve_spatial,
+    verify,
+)
+from magbend.sim.batch import OUTCOMES
+
+
+def attracted(gap_mm: float) -> tuple[Rod, MagnetField]:
+    rod = Rod(
+        name="attracted", side_mm=0.8, remanence_mT=-110.0,
+        sections=(Section(length_mm=55.0, E_MPa=12.0),),
+    )  # fmt: skip
+    return rod, MagnetField(magnet=Magnet.cube(55.0, 1.305), gap_mm=gap_mm)
+
+
+@pytest.mark.parametrize("gap_mm", [44.0, 44.5, 45.0])
+def test_the_plane_finds_what_space_finds(gap_mm: float) -> None:
+    rod, field = attracted(gap_mm)
+    found = solve(rod, field)
+    assert found.status == "stable"
+    space = solve_spatial(rod, field)
+    np.testing.assert_allclose(space.r_mm[-1, :2], found.centreline.tip_mm, atol=1e-5)
+    assert found.error_mm < 1e-6
+    assert verify(rod, field, found, degree=24) < 1e-4
+
+
+@pytest.mark.parametrize("gap_mm", [42.5, 43.0])
+def test_a_pulled_in_rod_ends_at_the_same_fold_in_plane_and_space(
+    gap_mm: float,
+) -> None:
+    rod, field = attracted(gap_mm)
+    plane, space = solve(rod, field), solve_spatial(rod, field)
+    assert plane.status == space.status == "pulled in: no equilibrium"
+    assert plane.load_limit == pytest.approx(space.load_limit, abs=1e-4)
+
+
+def designs(n: int, times: float) -> dict[str, np.ndarray]:
+    rng = np.random.default_rng([7, int(times)])
+    return {
+        "length_mm": rng.dirichlet([2.0, 2.0, 2.0], n)
+        * rng.uniform(20.0, 45.0, (n, 1)),
+        "E_MPa": rng.uniform(3.0, 20.0, (n, 3)),
+        "side_mm": rng.uniform(0.75, 1.3, n),
+        "remanence_mT": rng.choice([-1.0, 1.0], n) * times * rng.uniform(14.0, 26.0, n),
+        "gap_mm": rng.uniform(30.0, 120.0, n),
+    }
+
+
+@pytest.mark.parametrize("times", [5.0, 20.0])
+def test_no_random_rod_is_given_up(times: float) -> None:
+    for source in (
+        Magnet.cube(55.0, 1.305),
+        Field(Coil(diameter_mm=80.0, current_A=100.0, turns=100)),
+    ):
+        found = solve_many(designs(500, times), magnet=source)
+        assert not np.any(found["outcome"] == OUTCOMES.index("not solved"))
+        assert not np.any(found["outcome"] == OUTCOMES.index("unstable"))
