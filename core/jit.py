@@ -141,15 +141,22 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Kernel]:
     return lambda function: Kernel(function, options)
 
 
-def once(task: Callable[[], Result]) -> Result:
+def once(task: Callable[[], Result], *, patience: int | None = None) -> Result:
     """Return `task()`, quickest if this process does it once.
 
     Kernels called by `task` run as plain Python. If that takes long, `task` starts
-    again with compiled ones; so it must do nothing but compute.
+    again with compiled ones; so it may do nothing that must not be done twice.
+
+    Parameters
+    ----------
+    task : callable
+        What to do.
+    patience : int, optional
+        Calls of kernels that are not too long; `PATIENCE` by default.
     """
     import numpy as np
 
-    token = _calls_left.set([PATIENCE])
+    token = _calls_left.set([PATIENCE if patience is None else patience])
     try:
         with np.errstate(all="ignore"):
             return task()

@@ -26,6 +26,7 @@ from ..camera.oriented import oriented
 from ..extraction.follow import follow
 from ..extraction.setting import Setting
 from ..measurement import Measurement, failure
+from .cold import while_cold
 from .inputs import Source, digest, list_sources, read_source
 from .overlay import overlay_png
 from .state import STATE_FILE, State
@@ -247,8 +248,11 @@ def _run(task: _Task, todo: list[Source], workers: int) -> Iterator[Done]:
     search each anew in several processes.
     """
     finished = 0
+    for done in while_cold(task, todo):
+        finished += 1
+        yield done
     film = any(source.frame is not None for source in todo)
-    if workers > 1 and len(todo) > 1 and not film:
+    if workers > 1 and len(todo) - finished > 1 and not film:
         pool = ProcessPoolExecutor(
             min(workers, len(todo)),
             mp_context=multiprocessing.get_context("spawn"),
@@ -258,7 +262,7 @@ def _run(task: _Task, todo: list[Source], workers: int) -> Iterator[Done]:
         try:
             chunk = max(1, min(_CHUNK, len(todo) // workers))
             with _single_threaded_children():
-                results = pool.map(_work, todo, chunksize=chunk)
+                results = pool.map(_work, todo[finished:], chunksize=chunk)
             for done in results:
                 finished += 1
                 yield done

@@ -1,0 +1,97 @@
+"""The first photographs after installation: measured before the kernels are compiled.
+
+To compile all kernels takes a minute, once. A photograph takes some seconds in plain
+Python, so a few are measured that way, and of many the first ones, while another
+process compiles.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TypeVar
+
+import numpy as np
+
+from ...core.jit import Kernel, once
+from ..curve.fit import _solution
+from ..curve.joints import _evidence, _model
+from ..curve.likelihood import penalised
+from ..curve.spline import _penalty
+from ..edge.edges import _measure_side, _sample
+from ..edge.rough_edges import _rough_edges
+from ..edge.step_line import _fit_line, _fit_step
+from ..extraction.extract import measure
+from ..extraction.setting import Setting
+from ..find.rod import _half_widths
+from ..find.track import _resample
+from ..measurement import Pose
+from ..picture.photo import as_photo
+from ..synthetic.frames import curve
+from ..synthetic.parts import Block, Scene, scene_camera
+from ..synthetic.scene import render_scene
+
+Task = TypeVar("Task")
+Result = TypeVar("Result")
+
+FEW = 4
+"""So many photographs are done sooner in plain Python than compiled beside it."""
+
+PATIENCE = 5_000_000
+"""Calls of kernels that a photograph may take in plain Python: some ten seconds."""
+
+_LATEST: tuple[Kernel, ...] = (
+    _solution, _evidence, _model, penalised, _penalty, _measure_side, _sample,
+    _rough_edges, _fit_line, _fit_step, _half_widths, _resample,
+)  # fmt: skip
+"""Kernels of every part of a measurement, the slowest to compile among them."""
+
+
+def is_cold() -> bool:
+    """Whether kernels of a measurement are not compiled yet."""
+    return not all(kernel.is_stored for kernel in _LATEST)
+
+
+def compile_kernels() -> None:
+    """Compile all kernels of a measurement, by measuring a picture that is drawn."""
+    line = curve("arc", angle_deg=29.0)
+    pose = Pose(x_mm=16.0, y_mm=-30.0, angle_deg=0.0, height_mm=0.9)
+    scene, camera = Scene(clamp=Block(pose=pose), centreline=line), scene_camera()
+    picture = render_scene(scene, camera, np.random.default_rng(0))
+    photo, known = as_photo(picture), Setting(calibration=camera, rod_height_mm=0.9)
+    measure(photo, known)
+    measure(photo, replace(known, joints_mm=(10.0,)))
+
+
+def while_cold(
+    work: Callable[[Task], Result], todo: Sequence[Task]
+) -> Iterator[Result]:
+    """Yield results in plain Python, of the first tasks, until all is compiled.
+
+    Parameters
+    ----------
+    work : callable
+        What to do with each task; it may be done twice.
+    todo : sequence
+        The tasks. Few are done to the end: they are not worth the compiling.
+    """
+    if not todo or not is_cold():
+        return
+    helper = None
+    if len(todo) > FEW:
+        if not _sample.cache_folder:
+            return  # nothing would be kept of what another process compiles
+        context = multiprocessing.get_context("spawn")
+        helper = context.Process(target=compile_kernels, daemon=True)
+        helper.start()
+    try:
+        for task in todo:
+            if helper is not None and not helper.is_alive():
+                return
+            yield once(partial(work, task), patience=PATIENCE)
+    finally:
+        if helper is not None:
+            helper.terminate()
+            helper.join()
