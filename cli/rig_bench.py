@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..core.errors import ConfigError
 from .rig_flux import asker
 
 if TYPE_CHECKING:
@@ -15,8 +16,39 @@ if TYPE_CHECKING:
 
 
 def needs_twin(plan: Plan) -> bool:
-    """Return whether the rig file names the computed bench."""
-    return plan.rig.camera.backend == "twin" or plan.rig.meter.driver == "twin"
+    """Return whether the rig file names the computed bench.
+
+    Raises
+    ------
+    ConfigError
+        If it names some of its devices and some real ones: nothing named is left out
+        without a word.
+    """
+    rig, where = plan.rig, plan.rig_path
+    twins = {
+        'camera.backend = "twin"': rig.camera.backend == "twin",
+        'meter.driver = "twin"': rig.meter.driver == "twin",
+    }
+    if not any(twins.values()):
+        return False
+    named = {
+        f"stage.port = {rig.stage.port!r}": rig.stage.port != "auto"
+        and not rig.stage.port.startswith("twin:"),
+        f"camera.backend = {rig.camera.backend!r}": rig.camera.backend
+        not in ("twin", "auto"),
+        f"camera.source = {rig.camera.source!r}": rig.camera.source != 0,
+        f"meter.driver = {rig.meter.driver!r}": rig.meter.driver
+        not in ("twin", "manual", "none"),
+    }
+    twin = next(text for text, is_so in twins.items() if is_so)
+    real = next((text for text, is_so in named.items() if is_so), None)
+    if real is not None:
+        raise ConfigError(
+            f"{where}: {twin} is the computed bench, which has all devices of its own, "
+            f"but {real} names a real one, which would not be opened; name the twin's "
+            "for all (camera.backend, meter.driver, no stage.port) or for none"
+        )
+    return True
 
 
 def asks_flux(plan: Plan, readings_mT: dict[float, float] | None) -> bool:

@@ -43,6 +43,11 @@ def wait(clock: Clock, duration_s: float, check: Check = go_on) -> None:
         clock.sleep(min(left_s, _SLICE_S))
 
 
+def utc_text(clock: Clock) -> str:
+    """Return the UTC time of a clock, ISO 8601 with milliseconds, ending in Z."""
+    return clock.utc().isoformat(timespec="milliseconds").replace("+00:00", "Z")
+
+
 class SystemClock:
     """The clock of the machine: use it with real devices."""
 

@@ -14,7 +14,7 @@ from typing import Any
 from ..core.errors import StageError
 from .clock import Clock
 from .errors import LinkLostError
-from .ports import check_port, register_twin_urls, why_not_open
+from .ports import SERIAL_ERRORS, check_port, register_twin_urls, why_not_open
 from .wire_log import WireLog
 
 _SLICE_S = 0.02
@@ -87,7 +87,7 @@ class Link:
             if self._dtr is not None:
                 port.dtr = self._dtr
             port.open()
-        except (OSError, ValueError) as error:
+        except SERIAL_ERRORS as error:
             raise StageError(why_not_open(self.port, error)) from None
         self._serial = port
         self._owner = threading.get_ident()
@@ -156,7 +156,7 @@ class Link:
         port, self._serial = self._serial, None
         if port is not None:
             self._log_received(whole=False)
-            with contextlib.suppress(OSError):
+            with contextlib.suppress(*SERIAL_ERRORS):
                 port.close()
             self._remark(f"closed {self.port}")
 
@@ -167,7 +167,7 @@ class Link:
             self._log.record(self._device, ">>", data)
         try:
             port.write(data)
-        except OSError as error:  # SerialException is one
+        except SERIAL_ERRORS as error:
             raise self._lost(error) from None
 
     def _receive(self) -> bool:
@@ -176,7 +176,7 @@ class Link:
             data = port.read(1)
             if data:
                 data += port.read(port.in_waiting)
-        except (OSError, TypeError) as error:  # TypeError: closed in the middle
+        except (*SERIAL_ERRORS, TypeError) as error:  # TypeError: closed in the middle
             raise self._lost(error) from None
         self._buffer += data
         self._unlogged += data
@@ -195,7 +195,7 @@ class Link:
     def _waiting(self) -> bool:
         try:
             return bool(self._require_open().in_waiting)
-        except (OSError, TypeError) as error:
+        except (*SERIAL_ERRORS, TypeError) as error:
             raise self._lost(error) from None
 
     def _take_line(self) -> str | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import stat
 from dataclasses import dataclass
@@ -160,6 +161,19 @@ def twin_under(port: str, folder: Path) -> str:
     return f"twin://{folder / name}{mark}{query}" if name.endswith(".json") else port
 
 
+def _serial_errors() -> tuple[type[Exception], ...]:
+    found: list[type[Exception]] = [OSError, ValueError]
+    with contextlib.suppress(ImportError):  # Windows has none
+        import termios
+
+        found.append(termios.error)  # no OSError: a port refuses parity with it
+    return tuple(found)
+
+
+SERIAL_ERRORS = _serial_errors()
+"""Whatever a port may raise when it is opened, set up, read or written."""
+
+
 def why_not_open(port: str, error: Exception) -> str:
     """Return why a port does not open, and the way out, in a sentence."""
     text = str(error)
@@ -173,6 +187,11 @@ def why_not_open(port: str, error: Exception) -> str:
         return (
             f"the port {port} may not be opened by this user; on Linux add the user "
             "to the group dialout and log in again"
+        )
+    if type(error).__name__ == "error":
+        return (
+            f"the port {port} refuses the line's settings (baud, bits, parity, stop "
+            f"bits): {text}; another adapter, or other settings of the device, may do"
         )
     return (
         f"the port {port} cannot be opened: {text}; "

@@ -27,8 +27,12 @@ from .twin_config import TwinConfig
 
 
 class SettleConfig(FileModel):
-    """The ``[settle]`` table: when the rod counts as still."""
+    """The ``[settle]`` table: when the rod counts as still.
 
+    By ``image``: after `time_s` pictures are compared; by ``time``: after `time_s`.
+    """
+
+    by: Literal["image", "time"] = "image"
     time_s: NonNegativeFloat = 2.0
     image_change_percent: PositiveFloat = 0.02
     frames: int = Field(default=5, ge=2)

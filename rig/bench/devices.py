@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from ...core.errors import MagbendError
 from ..camera.protocol import Camera
-from ..clock import Clock
+from ..clock import Clock, utc_text
 from ..meter.protocol import Meter
 from ..stage.gap import GapStage
 from ..wire_log import WireLog
@@ -37,8 +37,7 @@ class Devices:
 
     def utc(self) -> str:
         """Return the UTC time of the bench's clock, ISO 8601 with milliseconds."""
-        text = self.clock.utc().isoformat(timespec="milliseconds")
-        return text.replace("+00:00", "Z")
+        return utc_text(self.clock)
 
     def close(self) -> None:
         """Let every device go, also when one of them refuses."""

@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...core.errors import CameraError
-from ..clock import Check, Clock, go_on
+from ..clock import Check, Clock, go_on, utc_text
 from .config import CameraConfig
 from .protocol import Frame, Image, brightness
 
@@ -241,7 +241,7 @@ class CaptureCamera:
             state.counters.frames += 1
             state.newest = Frame(
                 image=image, arrival_s=self._clock.monotonic_s(),
-                time_utc=self._clock.utc().isoformat(timespec="milliseconds"),
+                time_utc=utc_text(self._clock),
                 number=state.counters.frames,
             )  # fmt: skip
             state.began_s = began_s

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from ...core.errors import CameraError
-from ..clock import Check, Clock, go_on, wait
+from ..clock import Check, Clock, go_on, utc_text, wait
 from .protocol import Frame, Image
 
 _SUFFIXES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".pgm", ".ppm"}
@@ -217,5 +217,5 @@ class VideoCamera:
 def _frame(image: Image, clock: Clock, number: int) -> Frame:
     return Frame(
         image=image, arrival_s=clock.monotonic_s(), number=number,
-        time_utc=clock.utc().isoformat(timespec="milliseconds"),
+        time_utc=utc_text(clock),
     )  # fmt: skip

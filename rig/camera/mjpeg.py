@@ -21,6 +21,7 @@ import numpy as np
 from ...core.errors import CameraError
 from ..clock import Clock
 from .capture import BrokenPictureError
+from .chunked import Chunks
 from .protocol import Image
 
 _CHUNK = 1 << 16
@@ -49,6 +50,7 @@ class MjpegSource:
         self._timeout_s = timeout_s
         self._socket: socket.socket | None = None
         self._parser = MultipartParser(b"")
+        self._chunks: Chunks | None = None
         self._empty_s = 0.0
         self.content_type = ""
 
@@ -86,8 +88,10 @@ class MjpegSource:
         # Some servers write the dashes into the parameter, some do not.
         mark = b"--" + boundary.group(1).lstrip("-").encode("latin-1")
         self._empty_s = self._clock.monotonic_s()
+        is_chunked = re.search(rb"(?im)^transfer-encoding:.*\bchunked", header)
+        self._chunks = Chunks() if is_chunked else None
         self._parser = MultipartParser(mark)
-        self._parser.feed(rest, self._empty_s)
+        self._parser.feed(self._body(rest), self._empty_s)
 
     def read(self) -> tuple[Image, float]:
         """Return the newest whole picture; older ones in the queue are skipped.
@@ -111,10 +115,19 @@ class MjpegSource:
             chunk = self._receive(0.0 if newest is not None else self._timeout_s)
             if chunk is None:
                 break
-            self._parser.feed(chunk, self._empty_s)
+            self._parser.feed(self._body(chunk), self._empty_s)
         if newest is None:
             raise CameraError(f"{_shown(self._url)}: sent nothing")
         return decode_jpeg(newest[0]), newest[1]
+
+    def _body(self, data: bytes) -> bytes:
+        """Return what of the body came with these bytes."""
+        if self._chunks is None:
+            return data
+        body = self._chunks.feed(data)
+        if self._chunks.is_over and not body:
+            raise CameraError(f"{_shown(self._url)}: the server ended the stream")
+        return body
 
     def close(self) -> None:
         """Close the connection."""

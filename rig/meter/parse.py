@@ -52,9 +52,12 @@ def parse_reply(
     try:
         value = _value(description, groups) * multiplier
         factor = _prefix(description, groups)
-        tesla = _tesla(description, groups, unit)
     except ValueError:
         return Sample(outcome="garbled", raw=reply)
+    try:
+        tesla = _tesla(description, groups, unit)
+    except ValueError:
+        return Sample(outcome="unit", raw=reply)
     if not math.isfinite(value) or abs(value) >= _INSTRUMENT_INFINITY:
         return Sample(outcome="overload", raw=reply)
     return Sample(outcome="ok", flux_mT=mT_from_T(value * factor * tesla), raw=reply)

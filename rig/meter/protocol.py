@@ -15,7 +15,11 @@ from typing import Any, Literal, Protocol
 
 from ..clock import Check, go_on
 
-Outcome = Literal["ok", "overload", "silent", "garbled", "manual", "none"]
+Outcome = Literal[
+    "ok", "overload", "silent", "torn", "garbled", "unit", "manual", "none",
+]  # fmt: skip
+"""torn: an answer without its end; garbled: one that is not understood; unit: the meter
+was switched to another unit meanwhile."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +29,8 @@ class Sample:
     Parameters
     ----------
     outcome : str
-        ``ok``, ``overload``, ``silent`` (no reply in time) or ``garbled``.
+        ``ok``, ``overload``, ``silent`` (nothing in time), ``torn`` (an answer without
+        its end), ``garbled`` (not understood) or ``unit`` (in another unit).
     flux_mT : float or None
         Only with ``ok``.
     raw : str
@@ -44,8 +49,7 @@ class Flux:
     Parameters
     ----------
     status : str
-        ``ok``, ``overload``, ``silent``, ``garbled``, ``manual`` (typed in) or ``none``
-        (no meter).
+        As of a sample, or ``manual`` (typed in) or ``none`` (no meter).
     flux_mT, sd_mT : float or None
         Mean and standard deviation of the good samples; None without any.
     samples : int
@@ -99,7 +103,8 @@ def combine(samples: Sequence[Sample], *, zero_mT: float = 0.0, sign: int = 1) -
     if "overload" in outcomes:
         return Flux(status="overload", raw=raw)
     if not good or 2 * len(good) < len(samples):
-        status: Outcome = "garbled" if "garbled" in outcomes else "silent"
+        worst: tuple[Outcome, ...] = ("unit", "garbled", "torn", "silent")
+        status = next(kind for kind in worst if kind in outcomes or kind == "silent")
         return Flux(status=status, raw=raw)
     flux_mT = [sign * value - zero_mT for value in good]
     sd_mT = statistics.stdev(flux_mT) if len(flux_mT) > 1 else None

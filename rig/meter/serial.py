@@ -16,7 +16,7 @@ import serial
 
 from ...core.errors import MeterError
 from ..clock import Check, go_on
-from ..ports import check_port, register_twin_urls, why_not_open
+from ..ports import SERIAL_ERRORS, check_port, register_twin_urls, why_not_open
 from .description import MeterDescription
 from .parse import parse_multiplier, parse_reply, parse_unit
 from .protocol import Flux, Sample, combine
@@ -113,14 +113,14 @@ class SerialMeter:
             unit = self._ask_unit(self._unit)
             if unit != self._unit:
                 self._unit = unit
-                return Flux(status="garbled", raw=tuple(r.raw for r in readings))
+                return Flux(status="unit", raw=tuple(r.raw for r in readings))
         return combine(readings, zero_mT=self._zero_mT, sign=self._sign)
 
     def close(self) -> None:
         """Let the port go."""
         try:
             self._device.close()
-        except (OSError, serial.SerialException) as error:
+        except SERIAL_ERRORS as error:
             logger.warning("%s: %s", self._port, error)
 
     def _open(self) -> Any:
@@ -138,7 +138,7 @@ class SerialMeter:
             if not self._port.count("://"):
                 device.exclusive = True
             device.open()
-        except (OSError, ValueError, serial.SerialException) as error:
+        except SERIAL_ERRORS as error:
             raise MeterError(
                 f"{self._description.name}: {why_not_open(self._port, error)}"
             ) from None
@@ -169,23 +169,33 @@ class SerialMeter:
         if read.mode == "stream":
             self._flush()
             if self._line() is None:
-                return Sample(outcome="silent")
+                return self._no_line()
             reply = self._line()
             return self._parsed(reply, 1.0)
-        before = self._ask(multiplier.command) if multiplier.command else None
+        if multiplier.command:
+            return self._with_prefix(multiplier.command)
         reply = self._ask(read.command)
-        if not multiplier.command:
-            return self._parsed(reply, 1.0)
-        after = self._ask(multiplier.command)
+        return self._parsed(reply, 1.0)
+
+    def _with_prefix(self, question: str) -> Sample:
+        """Return a reading whose prefix is asked for before and after it."""
+        before = self._ask(question, may_be_empty=True)
+        reply = self._ask(self._description.read.command)
+        after = self._ask(question, may_be_empty=True)
         if reply is None or before is None or after is None:
-            return Sample(outcome="silent", raw=reply or "")
+            return self._no_line()
         if before != after:
             return Sample(outcome="garbled", raw=f"{before} {reply} {after}")
         return self._parsed(reply, parse_multiplier(self._description, before))
 
+    def _no_line(self) -> Sample:
+        """Return what an answer without its end is: cut short, or none at all."""
+        raw = self._buffer.decode("latin-1")
+        return Sample(outcome="torn" if raw else "silent", raw=raw)
+
     def _parsed(self, reply: str | None, multiplier: float) -> Sample:
         if reply is None:
-            return Sample(outcome="silent")
+            return self._no_line()
         return parse_reply(
             self._description, reply, unit=self._unit, multiplier=multiplier
         )
@@ -214,12 +224,15 @@ class SerialMeter:
                 sample = self._parsed(seen, 1.0)
                 if sample.outcome != "garbled":
                     return sample
-        return Sample(outcome="garbled" if seen else "silent", raw=seen)
+        if seen:
+            return Sample(outcome="garbled", raw=seen)
+        raw = data.decode("latin-1")
+        return Sample(outcome="torn" if raw else "silent", raw=raw)
 
-    def _ask(self, command: str) -> str | None:
+    def _ask(self, command: str, *, may_be_empty: bool = False) -> str | None:
         self._flush()
         self._send(command)
-        return self._line()
+        return self._line(may_be_empty=may_be_empty)
 
     def _send(self, command: str) -> None:
         read = self._description.read
@@ -230,13 +243,16 @@ class SerialMeter:
         try:
             self._device.write(data)
             self._device.flush()
-        except (OSError, serial.SerialException) as error:
+        except SERIAL_ERRORS as error:
             raise self._lost(error) from None
         self._last_s = time.monotonic()
         self._told(">>", data)
 
-    def _line(self) -> str | None:
-        """Return the next whole, non-empty line, or None when the time is up."""
+    def _line(self, *, may_be_empty: bool = False) -> str | None:
+        """Return the next whole line, or None when the time is up.
+
+        Empty lines are passed over, unless an empty line is an answer.
+        """
         read = self._description.read
         end = read.reply_end.encode("latin-1")
         deadline_s = time.monotonic() + read.timeout_s
@@ -244,7 +260,7 @@ class SerialMeter:
             while end in self._buffer:
                 line, _, self._buffer = self._buffer.partition(end)
                 text = line.decode("latin-1").strip("\r\n\0 ")
-                if text:
+                if text or may_be_empty:
                     self._last_s = time.monotonic()
                     return text
             if len(self._buffer) > _LONGEST_REPLY:
@@ -257,7 +273,7 @@ class SerialMeter:
         self._check()
         try:
             data = bytes(self._device.read(max(self._device.in_waiting, 1)))
-        except (OSError, serial.SerialException, TypeError) as error:
+        except (*SERIAL_ERRORS, TypeError) as error:
             raise self._lost(error) from None
         if data:
             self._told("<<", data)
@@ -267,7 +283,7 @@ class SerialMeter:
         self._buffer = b""
         try:
             self._device.reset_input_buffer()
-        except (OSError, serial.SerialException) as error:
+        except SERIAL_ERRORS as error:
             raise self._lost(error) from None
 
     def _lost(self, error: Exception) -> MeterError:

@@ -34,6 +34,10 @@ from .witness import FLAG, Reading, Witness, testify
 logger = logging.getLogger(__name__)
 
 
+class _PauseAskedError(Exception):
+    """A pause is asked for while the stage moves."""
+
+
 class Session:
     """One sitting at the bench: from connected devices to ``end.json``."""
 
@@ -126,10 +130,10 @@ class Session:
         devices, plan = self.devices, self.plan
         self.state.tell(step=index + 1, state="moving")
         was_paused = self._pause()
-        move = devices.stage.goto_gap(gap_mm)
+        move, was_held = self._go_to(gap_mm)
         devices.camera.at_step(index, gap_mm)
         self.state.tell(state="settling", gap_mm=move.gap_mm)
-        was_paused = self._pause() or was_paused
+        was_paused = self._pause() or was_held or was_paused
         settled = settle(devices.camera, devices.clock, plan.settle, check=self._check)
         self.state.tell(state="measuring")
         flux = devices.meter.read_flux(
@@ -177,6 +181,30 @@ class Session:
         return self.folder.commit_step(
             record, {image_name(index): encode_png(frame.image)}
         )
+
+    def _go_to(self, gap_mm: float) -> tuple[MoveRecord, bool]:
+        """Go to a gap; a pause stops the stage on its way, and it goes on after.
+
+        Returns
+        -------
+        move : MoveRecord
+            How it came there.
+        was_paused : bool
+            Whether it was stopped on its way.
+        """
+        was_paused = False
+        while True:
+            try:
+                return self.devices.stage.goto_gap(gap_mm, moved=self._look), was_paused
+            except _PauseAskedError:
+                how = self.devices.stage.hold().sentence()
+                self.report(f"pausing: {how}")
+                was_paused = self._pause()
+
+    def _look(self, gap_mm: float) -> None:
+        self.state.tell(gap_mm=gap_mm)
+        if self.control.is_paused:
+            raise _PauseAskedError
 
     def _heed(self, record: Record) -> None:
         """Take a reading in; where it disagrees do as the plan's policy says."""

@@ -33,7 +33,7 @@ class Settled:
     Parameters
     ----------
     status : str
-        ``settled`` or ``timeout``.
+        ``settled``, ``timeout``, or ``waited`` (by time alone, no picture looked at).
     time_s : float
         From arrival of the stage until then.
     change_percent : float
@@ -149,6 +149,10 @@ def settle(
     """
     start_s = clock.monotonic_s()
     wait(clock, config.time_s, check)
+    if config.by == "time":
+        return Settled(
+            status="waited", time_s=config.time_s, change_percent=0.0, frames=0
+        )
     judge = StillnessJudge(config)
     after_s = clock.monotonic_s()
     frames = 0

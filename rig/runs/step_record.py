@@ -16,7 +16,7 @@ def step_flags(
 ) -> list[str]:
     """Return a word for every doubt of a step."""
     flags = [FLAG] if said.sentence else []
-    if settled.status != "settled":
+    if settled.status == "timeout":
         flags.append("settle_timeout")
     if move.approach != "far side":
         flags.append("approach_clipped")

@@ -102,7 +102,9 @@ def check_feed(feed_mm_min: float, bounds: LimitsConfig, limits: StageLimits) ->
     needed_mm = limits.stopping_mm(feed_mm_min)
     if needed_mm > room_mm:
         raise InterlockError(
-            f"at {feed_mm_min:g} mm/min the stage needs {needed_mm:.2f} mm to "
-            f"stop, but min_gap_mm is only {room_mm:g} mm before contact_gap_mm; "
-            "lower feed_mm_min or raise min_gap_mm"
+            f"at {feed_mm_min:g} mm/min and the board's acceleration of "
+            f"{limits.acceleration_mm_s2:g} mm/s2 ($120-$122 on GRBL, M201 on Marlin) "
+            f"the stage needs {needed_mm:.2f} mm to stop, but min_gap_mm is only "
+            f"{room_mm:g} mm before contact_gap_mm; lower feed_mm_min, raise "
+            "min_gap_mm or the acceleration"
         )

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from ...core.errors import CameraError
 from ..camera.protocol import Frame, Image
-from ..clock import Check, Clock, go_on, wait
+from ..clock import Check, Clock, go_on, utc_text, wait
 
 CameraFault = Literal["stall", "dark"]
 Render = Callable[[float, float], Image]
@@ -112,7 +112,7 @@ class VirtualCamera:
             image = (image * 0.5).astype(image.dtype)
         self._newest = Frame(
             image=image, arrival_s=arrival_s, number=self._number,
-            time_utc=self._clock.utc().isoformat(timespec="milliseconds"),
+            time_utc=utc_text(self._clock),
         )  # fmt: skip
         return self._newest
 

@@ -123,9 +123,16 @@ class FakeStage:
         self.machine_mm, self.zero_mm = machine_mm, map_[0]
         self.position_state = "homed"
 
-    def move_to(self, machine_mm: float, *, feed_mm_min: float) -> None:
+    def move_to(
+        self,
+        machine_mm: float,
+        *,
+        feed_mm_min: float,
+        moved: Callable[[float], None] = lambda machine_mm: None,
+    ) -> None:
         self._log(f"move {machine_mm:g}")
         self.clock.sleep(abs(machine_mm - self.machine_mm) / feed_mm_min * 60.0)
+        moved(self.machine_mm)
         self.machine_mm = machine_mm
 
     def status(self) -> StageStatus:

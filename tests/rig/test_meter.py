@@ -58,7 +58,7 @@ def test_replies_become_mT(driver, reply, unit, multiplier, flux_mT) -> None:
         ("lakeshore_425", "0.0380E+", "garbled"),
         ("fwbell_5080", "38.05", "garbled"),
         ("fwbell_5080", "38.05 furlong", "garbled"),
-        ("lutron_frame", "41ZZ0200003805", "garbled"),
+        ("lutron_frame", "41ZZ0200003805", "unit"),
         ("lutron_frame", "42B30200003805", "garbled"),
     ],
 )
@@ -299,7 +299,7 @@ def test_a_torn_reply_and_garbage_are_not_numbers() -> None:
         (b"00038\r" + FRAME + FRAME, "ok", 0.03805),
         (FRAME[:9] + FRAME + FRAME, "ok", 0.03805),
         (b"\x0242B30100009999\r" + FRAME, "ok", 0.03805),
-        (b"\x0241ZZ0100003805\r", "garbled", None),
+        (b"\x0241ZZ0100003805\r", "unit", None),
         (b"", "silent", None),
     ],
 )

@@ -191,7 +191,11 @@ class GrblSession:
         for _ in range(_OFFSET_EVERY):
             report = self.ask(timeout_s)
             missing = 0 if report else missing + 1
-            if missing == _SILENT_ASKS or (report and self.machine() is not None):
+            if (
+                self.deaf
+                or missing == _SILENT_ASKS
+                or (report and self.machine() is not None)
+            ):
                 break
         return report
 

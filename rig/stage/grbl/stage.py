@@ -42,6 +42,7 @@ from .session import CommandRefusedError, GrblSession
 from .stopping import reset_motion, stop_motion
 
 _HOMED_SLACK_MM = 0.02
+_ASKS = 3  # one missing answer is no silence
 
 
 class GrblStage(SerialStage[GrblSession]):
@@ -190,7 +191,7 @@ class GrblStage(SerialStage[GrblSession]):
     def status(self) -> StageStatus:
         """Ask the board; no answer is the state ``silent``."""
         session = self._require_session()
-        report = session.ask()
+        report = session.ask_place(self._config.answer_timeout_s / _ASKS)
         note(session, self._trust)
         code = session.alarm
         state = report.state if report else "silent" if code is None else "alarm"
@@ -293,7 +294,7 @@ class GrblStage(SerialStage[GrblSession]):
             self._reconnect()
             return
         session = self._require_session()
-        report = session.ask()
+        report = session.ask_place(self._config.answer_timeout_s / _ASKS)
         if report is not None and not stands(report):
             self.hold()
         elif not session.reset():
@@ -328,7 +329,7 @@ class GrblStage(SerialStage[GrblSession]):
         session, presence = self._session, self._presence
         if session and presence and self._link and self._link.is_open:
             with contextlib.suppress(StageError):
-                report = session.ask()
+                report = session.ask_place(self._config.answer_timeout_s / _ASKS)
                 note(session, self._trust)
                 machine = session.machine()
                 idle = report is not None and report.state == "idle"
