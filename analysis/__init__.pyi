@@ -4,6 +4,9 @@ from .compare.compare import (
 from .compare.compare import (
     comparison_table as comparison_table,
 )
+from .figures.write import (
+    write_figures as write_figures,
+)
 from .fit.models import (
     model_sentence as model_sentence,
 )

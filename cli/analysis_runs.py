@@ -36,6 +36,7 @@ def register(app: typer.Typer) -> None:
     for command, example in (
         (compare, "magbend analysis compare runs/gmc2"),
         (report, "magbend analysis report runs/gmc2"),
+        (figures, "magbend analysis figures runs/gmc2 --width-mm 88 --out figures"),
         (export, "magbend analysis export runs/gmc2 --out gmc2.mat"),
         (paper, "magbend analysis paper --out paper"),
         (audit, "magbend analysis audit"),
@@ -95,8 +96,8 @@ def report(
     """Write one self-contained HTML page, with the figures as PDF beside it."""
     from ..analysis import try_fit
     from ..analysis.compare.compare import write_comparison
+    from ..analysis.figures.several import gmc_numbers
     from ..analysis.report import write_report
-    from ..analysis.report.figures import gmc_numbers
 
     choice(model, ("rod", "solid"), "--model")
     loaded, left_out = loaded_runs(runs, unverified=unverified)
@@ -139,6 +140,32 @@ def report(
         )
     tell_left_out(left_out, len(done))
     typer.echo(str(files.html))
+
+
+def figures(
+    runs: list[Path] = _RUNS,
+    out: Path = typer.Option(..., "--out", help="Folder for SVG, PDF and CSV of each."),
+    width_mm: float = typer.Option(
+        181.0, "--width-mm", help="181 for two columns of a journal, 88 for one."
+    ),
+    no_fit: bool = typer.Option(False, "--no-fit", help="Leave the fit out."),
+    json: bool = JSON,
+) -> None:
+    """Write the figures a journal takes, with their numbers and a methods text."""
+    from ..analysis import try_fit, write_figures
+    from ..core.checks import within
+
+    within(width_mm, 60.0, 400.0, "--width-mm", "mm")
+    loaded, left_out = _loaded(runs)
+    done = _compared(loaded, left_out, "rod")
+    fits = [None if no_fit else try_fit(run.run, run.support) for run in done]
+    written = write_figures(done, out, fits=fits, width_mm=width_mm)
+    if json:
+        print_json({"files": [str(path) for path in written], "left_out": left_out})
+        return
+    for path in written:
+        typer.echo(str(path))
+    _tell_left_out(left_out, len(done))
 
 
 def export(

@@ -8,8 +8,8 @@ from pathlib import Path
 from ...core.progress import Progress, silent
 from ...vision import Setting, extract_files, read_calibration
 from ..compare.compare import check_any, compare_run, write_comparison
+from ..figures.several import gmc_numbers
 from ..report import write_report
-from ..report.figures import gmc_numbers
 from ..runs.load import load_run
 from .run import ImportedRun
 

@@ -27,10 +27,10 @@ from ..compare.compare import (
     comparison_table,
     write_comparison,
 )
+from ..figures.several import PANELS, gmc_numbers
 from ..fit.result import FitResult, write_fit
 from ..fit.runs import try_fit
 from ..report import write_report
-from ..report.figures import PANELS, gmc_numbers
 from ..runs.load import load_run
 from ..twin.run import bench_run
 from .audit import audit_html, audit_paper

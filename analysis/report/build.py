@@ -16,13 +16,15 @@ from ...core.errors import MagbendError, StoreError
 from ...core.files import write_bytes, write_text
 from ...core.progress import Progress, silent
 from ..compare.compare import Comparison, RunComparison, models_of
+from ..figures.fit import fit_figure
+from ..figures.run import field_figure, residual_figure, shapes_figure, step_label
+from ..figures.several import paper_figure, summary_figure
+from ..figures.style import to_pdf, to_svg
 from ..fit.models import model_sentence
 from ..fit.result import FitResult
 from ..runs.load import Step
-from . import figures
 from .budget import BudgetLine, tip_budget
 from .photos import photo_settings, photograph_svg
-from .style import to_pdf, to_svg
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -198,17 +200,17 @@ def _section(
         "failures": [c for c in run.of("magnet") if not c.ok],
         "warnings": run.run.warnings,
         "steps": steps,
-        "shapes": draw("shapes", lambda: figures.shapes_figure(run)),
+        "shapes": draw("shapes", lambda: shapes_figure(run)),
         "residuals": draw(
-            "residuals", lambda: figures.residual_figure(run) if compared else None
+            "residuals", lambda: residual_figure(run) if compared else None
         ),
-        "field": draw("field", lambda: figures.field_figure(run)),
+        "field": draw("field", lambda: field_figure(run)),
         "magnet_fit": run.magnet_fit,
         "magnet": run.magnet,
         "fit": _fit_context(fitted),
         "no_fit": fit if isinstance(fit, str) else "",
         "fit_figure": draw(
-            "fit", lambda: figures.fit_figure(fitted) if fitted is not None else None
+            "fit", lambda: fit_figure(fitted) if fitted is not None else None
         ),
         "budget": _budget(run, fitted) if full else [],
         "provenance": _provenance(run),
@@ -224,7 +226,7 @@ def _step(run: RunComparison, step: Step, photos: dict[str, Any]) -> dict[str, A
         "photo": photograph_svg(run, comparisons, **photos),
         "failed": not any(c.ok for c in comparisons),
         "status": comparisons[0].status,
-        "label": figures.step_label(comparisons[0]),
+        "label": step_label(comparisons[0]),
         "step": step,
         "flags": comparisons[0].flags,
     }
@@ -396,7 +398,7 @@ def _summary(runs: Sequence[RunComparison], drawing: _Drawing) -> dict[str, Any]
             "failed": sum(not c.ok for run in runs for c in run.of("magnet")),
         },
         "models": [_model_summary(runs, model) for model in models_of(runs)],
-        "figure": drawing.add("summary", figures.summary_figure(runs)),
+        "figure": drawing.add("summary", summary_figure(runs)),
     }
 
 
@@ -417,4 +419,4 @@ def _model_summary(runs: Sequence[RunComparison], model: str) -> dict[str, Any]:
 def _paper(by_number: dict[int, RunComparison] | None, drawing: _Drawing) -> str:
     if not by_number:
         return ""
-    return drawing.add("comparison", figures.paper_figure(by_number))
+    return drawing.add("comparison", paper_figure(by_number))

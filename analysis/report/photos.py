@@ -79,6 +79,7 @@ def photograph_svg(
         f'href="data:image/jpeg;base64,{encoded}"/>'
     ]
     parts += [_polyline(name, points) for name, points in lines]
+    parts.append(_scale_bar(run.run.calibration, first, (x0, y0, x1, y1)))
     return "".join([*parts, "</svg>"])
 
 
@@ -112,6 +113,30 @@ def _lines(
     if np.all(np.isfinite(measured)):
         lines.append(("measured", measured))
     return lines
+
+
+def _scale_bar(
+    calibration: Calibration | None, first: Comparison, box: tuple[int, int, int, int]
+) -> str:
+    """Return a bar of a round length at the lower left, at the height of the rod."""
+    pose = first.frame.pose if first.frame else None
+    if calibration is None or pose is None:
+        return ""
+    x0, y0, x1, y1 = box
+    middle = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
+    scale = calibration.mm_per_px(middle, height_mm=pose.height_mm)
+    wanted_mm = 0.25 * (x1 - x0) * scale
+    length_mm = max((n for n in (1, 2, 5, 10, 20, 50) if n <= wanted_mm), default=0)
+    if not length_mm:
+        return ""
+    pad, thick = 0.03 * (x1 - x0), 0.006 * (x1 - x0)
+    x, y = x0 + pad, y1 - pad
+    return (
+        f'<rect x="{x:.0f}" y="{y - thick:.0f}" width="{length_mm / scale:.1f}" '
+        f'height="{thick:.1f}" fill="#1b1f24"/><text x="{x:.0f}" '
+        f'y="{y - 2.5 * thick:.0f}" font-size="{6.0 * thick:.0f}" '
+        f'fill="#1b1f24">{length_mm} mm</text>'
+    )
 
 
 def _crop(lines: Sequence[Array], width: int, height: int) -> tuple[int, int, int, int]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...core.columns import split_unit
 from ...core.errors import InputError
 from ...core.files import output_file, write_bytes
 
@@ -73,21 +74,21 @@ def training_figure(report: TrainingReport, published_per_mm2: float) -> Any:
     """Draw the test error of every seed of every split, with the published one."""
     figure = new_figure()
     axes = figure.add_subplot()
-    for row, (split, errors) in enumerate(report.test_mse_per_mm2.items()):
+    for row, errors in enumerate(report.test_mse_per_mm2.values()):
         colour = COLOURS[row]
         axes.plot(errors, [row] * len(errors), "o", color=colour, alpha=0.6, ms=5)
         median = float(np.median(errors))
         axes.plot(median, row, "|", color=colour, ms=24, mew=2)
-        axes.text(median, row + 0.25, SPLIT_LABELS[split], ha="center", fontsize=8)
-    axes.axvline(published_per_mm2, color="0.3", ls="--", lw=1)
-    axes.text(published_per_mm2, -0.7, " published", fontsize=8, color="0.3")
+    axes.axvline(published_per_mm2, color="0.3", ls="--", lw=1, label="published")
+    axes.legend(fontsize=8, frameon=False)
     axes.set(
         xscale="log",
         xlabel="test mean squared error of a (1/mm²), one dot a seed, bar: median",
-        yticks=[],
         ylim=(-0.8, len(report.test_mse_per_mm2) - 0.3),
         title="What was held out, and how well it was predicted",
     )
+    names = [SPLIT_LABELS[split] for split in report.test_mse_per_mm2]
+    axes.set_yticks(range(len(names)), names, fontsize=8)
     axes.title.set_fontsize(9)
     return figure
 
@@ -131,11 +132,18 @@ def sobol_figure(found: Sensitivity) -> Any:
             bars = {"height": 0.9 * width, "color": colour}
             axes.barh(at, found.total[i, j], alpha=0.35, **bars)
             axes.barh(at, found.first[i, j], label=f"{flux:g} mT", **bars)
-        axes.set_title(output, fontsize=9)
-        axes.set_yticks(place, list(PARAMETERS), fontsize=8)
+        axes.set_title(_words(output), fontsize=9)
+        axes.set_yticks(place, [_words(name) for name in PARAMETERS], fontsize=8)
+        axes.set_xlim(0.0, 1.0)  # an estimate of a share may fall below by its noise
     panels[0].invert_yaxis()
     panels[0].legend(fontsize=7, frameon=False)
     figure.supxlabel(
         "share of the variance: solid alone, pale with interactions", fontsize=9
     )
     return figure
+
+
+def _words(name: str) -> str:
+    """Return a column's name as a label: ``tip_x_mm`` is "tip x (mm)"."""
+    quantity, unit = split_unit(name)
+    return quantity.replace("_", " ") + (f" ({unit})" if unit else "")

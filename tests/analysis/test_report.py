@@ -105,8 +105,8 @@ def test_figures_lie_beside_as_pdf_with_fonts(single: Path) -> None:
 
 
 def test_same_run_gives_the_same_figures(tmp_path: Path) -> None:
-    from magbend.analysis.report.figures import shapes_figure
-    from magbend.analysis.report.style import to_pdf, to_svg
+    from magbend.analysis.figures.run import shapes_figure
+    from magbend.analysis.figures.style import to_pdf, to_svg
 
     run = compared(tmp_path / "a")
     first, second = shapes_figure(run), shapes_figure(run)

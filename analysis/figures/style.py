@@ -10,10 +10,14 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any, cast
 
+from ...core.checks import within
+
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 INK = "#1b1f24"
@@ -35,8 +39,18 @@ _VARIABLES = {
     BAD: "var(--bad)",
     IMPORTED: "var(--imported)",
 }
-WIDTH_IN = 181.0 / 25.4
-"""Width of a two-column figure, 181 mm."""
+WIDTH_MM = 181.0
+"""Width of a two-column figure."""
+
+NARROW_MM = 130.0
+"""Below this width panels stand below each other."""
+
+_LEFT_MM, _RIGHT_MM, _BOTTOM_MM, _TOP_MM = 16.0, 3.0, 11.0, 7.0
+
+SERIES = ("#0072b2", "#d55e00", "#009e73", "#aa4499", "#b8860b", "#1b1f24")
+"""Colours that are told apart with any colour vision (Okabe and Ito, Tol)."""
+
+MARKERS = "os^Dv<>"
 
 MODEL_COLOUR = {"uniform": UNIFORM, "magnet": MAGNET, "imported": IMPORTED}
 MODEL_DASH = {"uniform": (4.0, 2.0), "magnet": (None, None), "imported": (6.0, 1.5)}
@@ -92,23 +106,85 @@ def drawing() -> AbstractContextManager[None]:
     return mpl.rc_context(cast("Any", _RC))
 
 
-def new_figure(height_mm: float, *, gap: float = 0.24) -> Figure:
-    """Return an empty figure 181 mm wide, of the given height.
+def new_panels(
+    columns: int,
+    *,
+    height_mm: float,
+    width_mm: float = WIDTH_MM,
+    gap_mm: float = 20.0,
+    ratios: Sequence[float] | None = None,
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure with panels side by side, or below each other if it is narrow.
 
     Margins are fixed: labels of one line fit, and laying out automatically would take
-    half of the time of a report. `gap` is the room between panels, in panel widths.
+    half of the time of a report.
+
+    Parameters
+    ----------
+    columns : int
+        Panels.
+    height_mm : float
+        Of one row of panels, labels included.
+    width_mm : float
+        Of the figure: 181 for two columns of a journal, 88 for one.
+    gap_mm : float
+        Room between panels for tick labels.
+    ratios : sequence of float, optional
+        Widths of the panels to each other, where they stand side by side.
+
+    Raises
+    ------
+    InputError
+        If the width is not from 60 to 400 mm.
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(WIDTH_IN, height_mm / 25.4))
+    within(width_mm, 60.0, 400.0, "the width of a figure", "mm")
+    is_narrow = width_mm < NARROW_MM and columns > 1
+    rows, across = (columns, 1) if is_narrow else (1, columns)
+    total_mm = height_mm * rows
+    figure = Figure(figsize=(width_mm / 25.4, total_mm / 25.4))
+    panel_mm = (width_mm - _LEFT_MM - _RIGHT_MM - (across - 1) * gap_mm) / across
+    tall_mm = height_mm - _BOTTOM_MM - _TOP_MM
     figure.subplots_adjust(
-        left=14.0 / 181.0,
-        right=1.0 - 3.0 / 181.0,
-        bottom=11.0 / height_mm,
-        top=1.0 - 7.0 / height_mm,
-        wspace=gap,
+        left=_LEFT_MM / width_mm,
+        right=1.0 - _RIGHT_MM / width_mm,
+        bottom=_BOTTOM_MM / total_mm,
+        top=1.0 - _TOP_MM / total_mm,
+        wspace=gap_mm / panel_mm,
+        hspace=(_BOTTOM_MM + _TOP_MM) / tall_mm,
     )
-    return figure
+    kept = None if ratios is None or is_narrow else list(ratios)
+    axes = figure.subplots(rows, across, squeeze=False, width_ratios=kept)
+    return figure, list(axes.ravel())
+
+
+def new_grid(
+    rows: int, columns: int, *, height_mm: float, width_mm: float = WIDTH_MM
+) -> tuple[Figure, list[list[Axes]]]:
+    """Return a figure of small multiples that share their axes.
+
+    Parameters
+    ----------
+    rows, columns : int
+        Panels down and across.
+    height_mm : float
+        Of one row.
+    width_mm : float
+        Of the figure.
+    """
+    from matplotlib.figure import Figure
+
+    within(width_mm, 60.0, 400.0, "the width of a figure", "mm")
+    total_mm = rows * height_mm + _BOTTOM_MM
+    figure = Figure(figsize=(width_mm / 25.4, total_mm / 25.4))
+    figure.subplots_adjust(
+        left=_LEFT_MM / width_mm, right=1.0 - _RIGHT_MM / width_mm,
+        bottom=_BOTTOM_MM / total_mm, top=1.0 - 6.0 / total_mm,
+        wspace=0.06, hspace=0.08,
+    )  # fmt: skip
+    axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    return figure, [list(row) for row in axes]
 
 
 def to_pdf(figure: Figure) -> bytes:
