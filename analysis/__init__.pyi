@@ -73,6 +73,12 @@ from .imports.run import (
 from .imports.steps import (
     write_template as write_template,
 )
+from .package.crate import (
+    Description as Description,
+)
+from .package.crate import (
+    write_package as write_package,
+)
 from .report.build import (
     write_report as write_report,
 )

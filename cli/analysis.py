@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from . import analysis_fit, analysis_import, analysis_model, analysis_runs
+from . import (
+    analysis_fit,
+    analysis_import,
+    analysis_model,
+    analysis_out,
+    analysis_runs,
+)
 from .console import group
 
 app = group(
@@ -15,3 +21,4 @@ analysis_runs.register(app)
 analysis_fit.register(app)
 analysis_import.register(app)
 analysis_model.register(app)
+analysis_out.register(app)

@@ -1,4 +1,4 @@
-"""``magbend analysis compare|fit|report|export|paper|audit|probe``: runs and theory."""
+"""``magbend analysis compare|report|paper|audit|probe``: runs and theory."""
 
 from __future__ import annotations
 
@@ -36,8 +36,6 @@ def register(app: typer.Typer) -> None:
     for command, example in (
         (compare, "magbend analysis compare runs/gmc2"),
         (report, "magbend analysis report runs/gmc2"),
-        (figures, "magbend analysis figures runs/gmc2 --width-mm 88 --out figures"),
-        (export, "magbend analysis export runs/gmc2 --out gmc2.mat"),
         (paper, "magbend analysis paper --out paper"),
         (audit, "magbend analysis audit"),
         (probe, "magbend analysis probe --reading-mT 20.07 --side-mm 1.0"),
@@ -63,9 +61,7 @@ def compare(
     choice(model, ("rod", "solid"), "--model")
     loaded, left_out = loaded_runs(runs, unverified=unverified)
     outputs(out, *(run.path / "comparison.csv" for run in loaded))
-    done = _compared(
-        loaded, left_out, model, clamp_angle_deg, gravity_m_s2, load_factor
-    )
+    done = compared(loaded, left_out, model, clamp_angle_deg, gravity_m_s2, load_factor)
     for run in done:
         write_comparison(run.run.path / "comparison.csv", [run])
     if out is not None:
@@ -105,9 +101,7 @@ def report(
         loaded[0].path / "report.html" if len(loaded) == 1 else Path("report.html")
     )
     outputs(path, *(run.path / "comparison.csv" for run in loaded))
-    done = _compared(
-        loaded, left_out, model, clamp_angle_deg, gravity_m_s2, load_factor
-    )
+    done = compared(loaded, left_out, model, clamp_angle_deg, gravity_m_s2, load_factor)
     fits = [None if no_fit else try_fit(run.run, run.support) for run in done]
     with progress("report") as tell:
         files = write_report(
@@ -140,52 +134,6 @@ def report(
         )
     tell_left_out(left_out, len(done))
     typer.echo(str(files.html))
-
-
-def figures(
-    runs: list[Path] = _RUNS,
-    out: Path = typer.Option(..., "--out", help="Folder for SVG, PDF and CSV of each."),
-    width_mm: float = typer.Option(
-        181.0, "--width-mm", help="181 for two columns of a journal, 88 for one."
-    ),
-    no_fit: bool = typer.Option(False, "--no-fit", help="Leave the fit out."),
-    json: bool = JSON,
-) -> None:
-    """Write the figures a journal takes, with their numbers and a methods text."""
-    from ..analysis import try_fit, write_figures
-    from ..core.checks import within
-
-    within(width_mm, 60.0, 400.0, "--width-mm", "mm")
-    loaded, left_out = _loaded(runs)
-    done = _compared(loaded, left_out, "rod")
-    fits = [None if no_fit else try_fit(run.run, run.support) for run in done]
-    written = write_figures(done, out, fits=fits, width_mm=width_mm)
-    if json:
-        print_json({"files": [str(path) for path in written], "left_out": left_out})
-        return
-    for path in written:
-        typer.echo(str(path))
-    _tell_left_out(left_out, len(done))
-
-
-def export(
-    runs: list[Path] = RUNS,
-    out: Path = typer.Option(
-        ...,
-        "--out",
-        help="NAME.mat, NAME.parquet, NAME.csv, or a folder for all three.",
-    ),
-    unverified: bool = UNVERIFIED,
-) -> None:
-    """Export points, steps and comparisons as CSV, Parquet or MATLAB .mat."""
-    from ..analysis.compare.export import check_export, export_runs
-
-    loaded, left_out = loaded_runs(runs, unverified=unverified)
-    check_export(out)
-    done = _compared(loaded, left_out, "rod")
-    for path in export_runs(done, out):
-        typer.echo(str(path))
-    tell_left_out(left_out, len(done))
 
 
 def paper(
@@ -269,7 +217,7 @@ def probe(
         typer.echo(line)
 
 
-def _compared(
+def compared(
     loaded: Sequence[RunData],
     left_out: list[str],
     model: str,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -11,12 +12,14 @@ import numpy as np
 
 from ...core.errors import InputError, MissingExtraError
 from ...core.files import output_file, output_folder, write_bytes, write_text
+from ...core.units import T_from_mT
 from .compare import RunComparison, comparison_table
+from .hierarchy import check_hdf5, nexus
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FORMATS = (".csv", ".parquet", ".mat")
+FORMATS = (".csv", ".parquet", ".mat", ".h5", ".nxs", ".txt")
 
 
 def tables(runs: Sequence[RunComparison]) -> dict[str, pd.DataFrame]:
@@ -77,8 +80,10 @@ def export_runs(runs: Sequence[RunComparison], out: Path) -> list[Path]:
         From `compare_run`.
     out : Path
         ``NAME.mat`` is one file with a struct a table; ``NAME.csv`` and
-        ``NAME.parquet`` become one file a table (``NAME_points.csv``, ...); a name
-        without ending is a folder that gets all three.
+        ``NAME.parquet`` become one file a table (``NAME_points.csv``, ...); ``NAME.h5``
+        or ``.nxs`` is NeXus; ``NAME.txt`` is a table that COMSOL interpolates: flux
+        density and arc length, then x, y and theta as measured. A name without ending
+        is a folder that gets CSV, Parquet and .mat.
 
     Returns
     -------
@@ -93,6 +98,12 @@ def export_runs(runs: Sequence[RunComparison], out: Path) -> list[Path]:
         If Parquet is asked for and pyarrow is not installed.
     """
     ending = check_export(out)
+    if ending in (".h5", ".nxs"):
+        write_bytes(out, nexus(runs))
+        return [out]
+    if ending == ".txt":
+        write_text(out, comsol_table(runs))
+        return [out]
     data = tables(runs)
     if not ending:
         written = _write(data, out / "runs.csv", ".csv")
@@ -100,6 +111,52 @@ def export_runs(runs: Sequence[RunComparison], out: Path) -> list[Path]:
             written += _write(data, out / "runs.parquet", ".parquet")
         return written + _write(data, out / "runs.mat", ".mat")
     return _write(data, out, ending)
+
+
+def comsol_table(runs: Sequence[RunComparison]) -> str:
+    """Return the measured lines as COMSOL's spreadsheet of an interpolation, in SI.
+
+    Two arguments (flux density and arc length), three functions (x, y, theta); heads in
+    the last ``%`` line.
+
+    Raises
+    ------
+    InputError
+        If the runs have different rods, or a step has no flux density.
+    """
+    names = {run.run.specimen.name for run in runs}
+    if len(names) > 1:
+        raise InputError(
+            "a table for COMSOL must be of one rod; instead received "
+            f"{', '.join(sorted(names))}: export each for itself"
+        )
+    rows = []
+    for run in runs:
+        for step in run.run.steps:
+            frame = run.run.frame(step)
+            line = frame.centreline if frame else None
+            if line is None:
+                continue
+            if not math.isfinite(step.flux_mT):
+                raise InputError(
+                    f"{run.run.label}, step {step.index}: has no flux density, which "
+                    "is the first argument of a table for COMSOL"
+                )
+            rows += [
+                (T_from_mT(step.flux_mT), *values)
+                for values in zip(
+                    line.s_mm * 1e-3, line.x_mm * 1e-3, line.y_mm * 1e-3,
+                    line.theta_rad, strict=True,
+                )
+            ]  # fmt: skip
+    head = (
+        f"% Rod: {names.pop()}\n"
+        "% Measured; interpolate x, y and theta over flux and s\n"
+        "% flux (T)   s (m)   x (m)   y (m)   theta (rad)\n"
+    )
+    return head + "".join(
+        "   ".join(f"{value:.12g}" for value in row) + "\n" for row in rows
+    )
 
 
 def check_export(out: Path) -> str:
@@ -120,6 +177,8 @@ def check_export(out: Path) -> str:
         )
     if ending == ".parquet":
         _check_parquet()
+    if ending in (".h5", ".nxs"):
+        check_hdf5()
     if ending:
         output_file(out)
     else:
