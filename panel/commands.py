@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..core.errors import InputError, MagbendError, StageError
 from .arguments import Arguments, Outcome, number
 from .bench.parts import Parts
+from .photos import actions as photo_actions
 from .runs import actions as run_actions
 from .setup import actions as setup_actions
 
@@ -181,6 +182,8 @@ COMMANDS: dict[str, Command] = {
     "run-resume": Command(do=run_actions.resume_run),
     "run-abort": Command(do=run_actions.abort_run, needs_controls=False),
     "job": Command(do=run_actions.start_job),
+    "point": Command(do=photo_actions.point_out),
+    "design": Command(do=photo_actions.design_from),
     "setup-begin": Command(do=setup_actions.begin),
     "setup-rig": Command(do=setup_actions.set_rig),
     "setup-gap": Command(do=setup_actions.set_gap),

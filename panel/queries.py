@@ -9,8 +9,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..core.errors import InputError, MagbendError, StoreError
+from ..core.errors import InputError, StoreError
 from .bench.sight import pack
+from .photos.actions import figure_of
+from .photos.gallery import list_photos, photo_path, shrunk, upright
 from .runs.listing import list_runs, run_detail
 from .runs.plan_file import check_plan, plan_values
 from .setup import board
@@ -34,8 +36,6 @@ class File:
 
 SERVED = {".png", ".jpg", ".jpeg", ".html", ".pdf", ".svg", ".csv", ".json", ".toml"}
 """What of a run folder is shown."""
-
-_WIDEST_PX = 1600
 
 
 def _plan(panel: Panel, query: Query) -> Any:
@@ -66,6 +66,16 @@ def _board_pdf(_panel: Panel, _query: Query) -> File:
         return File(data=path.read_bytes(), kind="application/pdf")
 
 
+def _photo(panel: Panel, query: Query) -> File:
+    image = upright(photo_path(panel.workspace, query.get("name", "")))
+    return File(data=shrunk(image, query.get("width", "1600")), kind="image/jpeg")
+
+
+def _photo_size(panel: Panel, query: Query) -> Any:
+    image = upright(photo_path(panel.workspace, query.get("name", "")))
+    return {"size_px": list(image.shape[1::-1])}
+
+
 def _ports(_panel: Panel, _query: Query) -> Any:
     from ..rig import list_ports
 
@@ -87,20 +97,7 @@ def run_file(panel: Panel, run: str, path: str, width: str) -> Path | File:
         raise StoreError(f"the run {run} has no file {path!r} to show")
     if not width:
         return found
-    if not width.isdigit() or not 16 <= int(width) <= _WIDEST_PX:
-        raise InputError(f"width must be from 16 to {_WIDEST_PX} px")
-    return _small(found, int(width))
-
-
-def _small(path: Path, width: int) -> File:
-    import cv2
-
-    image = cv2.imread(str(path), cv2.IMREAD_COLOR)
-    if image is None:
-        raise MagbendError(f"{path.name} is no picture")
-    height = max(1, round(image.shape[0] * width / image.shape[1]))
-    small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
-    return File(data=cv2.imencode(".jpg", small)[1].tobytes(), kind="image/jpeg")
+    return File(data=shrunk(upright(found), width), kind="image/jpeg")
 
 
 QUERIES: dict[str, Callable[[Panel, Query], Any]] = {
@@ -109,6 +106,13 @@ QUERIES: dict[str, Callable[[Panel, Query], Any]] = {
     "setup": lambda panel, _query: setup_state(panel),
     "board": lambda panel, _query: board.look(panel),
     "ports": _ports,
+    "design-figure": lambda panel, query: File(
+        data=figure_of(panel.workspace, query.get("name", "")).read_bytes(),
+        kind="image/svg+xml",
+    ),
+    "photos": lambda panel, _query: list_photos(panel.workspace),
+    "photo": _photo,
+    "photo-size": _photo_size,
     "board-pdf": _board_pdf,
     "scan": lambda panel, _query: judge_newest_scan(panel.workspace),
     "runs": lambda panel, _query: list_runs(panel.workspace),

@@ -195,7 +195,7 @@ def pack(picture: Picture) -> Packed:
     """Return a picture as JPEG, at most `WIDEST_PX` wide."""
     import cv2
 
-    image = as_bytes(picture.image)
+    image: NDArray[Any] = as_bytes(picture.image)
     height, width = image.shape[:2]
     if width > WIDEST_PX:
         size = (WIDEST_PX, round(height * WIDEST_PX / width))
@@ -211,7 +211,7 @@ def pack(picture: Picture) -> Packed:
 def as_bytes(image: NDArray[Any]) -> NDArray[np.uint8]:
     """Return a picture of any depth with eight bits a channel, for the eye."""
     if image.dtype == np.uint8:
-        return image
+        return np.asarray(image, dtype=np.uint8)
     full = 1.0 if image.dtype.kind == "f" else float(np.iinfo(image.dtype).max)
     scaled = np.clip(image.astype(np.float32) * (255.0 / full), 0.0, 255.0)
     return scaled.astype(np.uint8)

@@ -84,8 +84,8 @@ def check_plan(workspace: Workspace, values: Mapping[str, Any]) -> dict[str, Any
     text = edited(read_text(workspace.plan_path), _named(values))
     plan = read_as(workspace.plan_path, text, read_plan)
     files = workspace.files()
-    rows = []
-    for step in plan_steps(plan):
+    steps, rows = plan_steps(plan), []
+    for step in steps:
         found = predict(files, Place(gap_mm=step.gap_mm))
         magnet = found.get("magnet.fitted", found["magnet.nominal"])
         rows.append(
@@ -99,7 +99,7 @@ def check_plan(workspace: Workspace, values: Mapping[str, Any]) -> dict[str, Any
                 "shape_mm": shape_mm(magnet),
             }
         )
-    total_s = homing_s(plan) + sum(row["time_s"] for row in rows)
+    total_s = homing_s(plan) + sum(step.time_s for step in steps)
     return {"steps": rows, "total_s": total_s, "name": plan.model.name}
 
 

@@ -6,8 +6,10 @@ import * as bench from "./bench.js";
 import * as run from "./run.js";
 import * as runs from "./runs.js";
 import * as setup from "./setup.js";
+import * as point from "./point.js";
+import * as design from "./design.js";
 
-const pages = {setup, bench, run, runs};
+const pages = {setup, bench, run, runs, point, design};
 const $ = (id) => document.getElementById(id);
 let current = "";
 

@@ -1,0 +1,1 @@
+"""Photographs of the bench's folder, pointed at and drawn upon."""
