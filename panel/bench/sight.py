@@ -25,6 +25,9 @@ JPEG_QUALITY = 82
 WIDEST_PX = 1920
 RETRY_S = 2.0
 REST_S = 0.25
+REST_AFTER = 3.0
+"""Rest after a search in vain, in times of how long it took."""
+
 STATISTICS_S = 0.5
 """How often focus, histogram and saturation are looked at."""
 
@@ -178,6 +181,7 @@ class Sight:
                     self._fresh.wait(1.0)
                     continue
                 done = self._newest
+            begun_s = time.monotonic()
             try:
                 drawn = self._measure(done)
             except MagbendError as error:
@@ -189,6 +193,9 @@ class Sight:
             self._overlays_s.append(now_s)
             late_ms = 1e3 * (now_s - done.arrival_s)
             self._draw({**drawn, "number": done.number, "late_ms": late_ms})
+            if drawn["status"] != "ok":
+                # A search in vain is long: leave the picture its share of the machine.
+                self._ending.wait(min(REST_AFTER * (now_s - begun_s), RETRY_S))
 
 
 def pack(picture: Picture) -> Packed:

@@ -21,7 +21,7 @@ export function make(root) {
   const several = (what, label) => h("button", {type: "button", disabled: true, onclick: () => act("job", {what, runs: [...chosen]}, true)}, label);
   const buttons = [several("compare", "Compare"), several("fit", "Fit together"), several("report", "Report of all"), several("package", "Package for a paper")];
   fill(root, h("div", {class: "columns"},
-    h("section", {class: "card", "aria-labelledby": "runs-title"}, h("div", {class: "row spread"}, h("h1", {id: "runs-title"}, "Runs"), h("div", {class: "row", role: "group", "aria-label": "With the chosen runs"}, buttons)), none,
+    h("div", {class: "card"}, h("div", {class: "row spread"}, h("h1", {}, "Runs"), h("div", {class: "row", role: "group", "aria-label": "With the chosen runs"}, buttons)), none,
       h("div", {class: "wide"}, h("table", {class: "runs"}, h("thead", {}, h("tr", {}, ["Choose", "Run", "State", "Steps", "Doubts", "Done so far"].map((name) => h("th", {scope: "col"}, name)))), rows))),
     h("div", {class: "stack"}, h("section", {class: "card", "aria-label": "One run"}, detail), h("section", {class: "card", "aria-label": "Work"}, h("h2", {}, "Work"), jobs))));
   view = {rows, none, jobs, detail, buttons};
