@@ -221,7 +221,7 @@ def as_bytes(image: NDArray[Any]) -> NDArray[np.uint8]:
         return np.asarray(image, dtype=np.uint8)
     full = 1.0 if image.dtype.kind == "f" else float(np.iinfo(image.dtype).max)
     scaled = np.clip(image.astype(np.float32) * (255.0 / full), 0.0, 255.0)
-    return scaled.astype(np.uint8)
+    return np.asarray(scaled, dtype=np.uint8)
 
 
 def statistics(image: NDArray[Any]) -> dict[str, Any]:
