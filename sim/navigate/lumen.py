@@ -268,7 +268,9 @@ def _crossing(a: Array, b: Array, *, same: bool) -> Point | None:
     with np.errstate(divide="ignore", invalid="ignore"):
         t = (d[..., 0] * s[..., 1] - d[..., 1] * s[..., 0]) / det
         u = (d[..., 0] * r[..., 1] - d[..., 1] * r[..., 0]) / det
-    hit = (t >= 0.0) & (t <= 1.0) & (u >= 0.0) & (u <= 1.0)
+    lengths = np.hypot(r[..., 0], r[..., 1]) * np.hypot(s[..., 0], s[..., 1])
+    hit = abs(det) > 1e-9 * lengths  # else they are parallel
+    hit &= (t >= 0.0) & (t <= 1.0) & (u >= 0.0) & (u <= 1.0)
     if same:
         i, j = np.indices(hit.shape)
         hit &= abs(i - j) > 1

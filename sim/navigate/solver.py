@@ -16,7 +16,7 @@ from .passage import Passage
 from .walk import Walk
 
 NO_SUPPORT = Support()
-DEEP = 1e6
+DEEP = 3.0
 """Sides of the rod behind a wall beyond which a point has come round the wall's end."""
 
 
