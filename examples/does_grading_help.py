@@ -161,8 +161,8 @@ def best_like(rod: Specimen, task: str) -> Specimen:
         length = rod.length_mm * share / share.sum()
         modulus = np.exp(np.clip([z[2] + z[3], z[3], 0.0], -3.0, 3.0))
         sections = tuple(
-            replace(rod.sections[0], length_mm=float(l), E_MPa=float(E))
-            for l, E in zip(length, modulus, strict=True)
+            replace(rod.sections[0], length_mm=float(part), E_MPa=float(E))
+            for part, E in zip(length, modulus, strict=True)
         )
         plain = replace(rod, name=f"best for {task}", sections=sections)
         factor = tip_compliance(plain) / tip_compliance(rod)

@@ -79,7 +79,8 @@ def look(rod, u, bent, walls, half, h, t, free):  # type: ignore[no-untyped-def]
                 length if i == 4 * n
                 else rod.s[e] + 0.25 * (i % 4) * (rod.s[e + 1] - rod.s[e]),
             )  # fmt: skip
-            gaps[i] = clearance(walls, piece, at.x, at.y).distance - half
+            distance = clearance(walls, piece, at.x, at.y).distance
+            gaps[i] = distance - half if distance > -walls.depth else 1e9
         for i in range(4 * n + 1):
             if gaps[i] > h:
                 continue
@@ -91,9 +92,15 @@ def look(rod, u, bent, walls, half, h, t, free):  # type: ignore[no-untyped-def]
             s = length
             if i < 4 * n:
                 s = rod.s[e] + 0.25 * (i % 4) * (rod.s[e + 1] - rod.s[e])
+            rough = s
+            if i < 4 * n:
                 s = nearest(rod, u, bent, walls, piece, s, s, 0.3 * h)
             at = station(rod, u, bent, s)
             gap = clearance(walls, piece, at.x, at.y).distance - half
+            if gap < -walls.depth:
+                s = rough
+                gap = gaps[i]
+                at = station(rod, u, bent, s)
             if s < 1e-9 or gap > -OVERLAP:
                 continue
             deepest = max(deepest, -gap)

@@ -38,8 +38,8 @@ class Walls(NamedTuple):
     first : ndarray, shape (pieces + 1,)
         Where the parts of each piece begin.
     depth : float
-        A point deeper behind a wall than this has come round its end: the wall does not
-        know it.
+        A point deeper behind a wall than this has come round its end: no contact begins
+        there.
     """
 
     parts: Array
@@ -101,10 +101,7 @@ def _to_part(p, x, y):  # type: ignore[no-untyped-def]
 
 @njit(**PART)
 def clearance(walls, piece, x, y):  # type: ignore[no-untyped-def]
-    """Return the signed distance (`Near`) of a point from a piece.
-
-    A point behind a wall by more than `walls.depth` is as far as one can be.
-    """
+    """Return the signed distance (`Near`) of a point from a piece."""
     best = Near(1e9, 0.0, 1.0, 0.0)
     least = 1e9
     for i in range(walls.first[piece], walls.first[piece + 1]):
@@ -115,8 +112,6 @@ def clearance(walls, piece, x, y):  # type: ignore[no-untyped-def]
         if abs(near.distance) < least:
             least = abs(near.distance)
             best = near
-    if best.distance < -walls.depth:
-        return Near(1e9, 0.0, 1.0, 0.0)
     return best
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from magbend.core.magnet import Magnet
 from magbend.core.specimen import Section, Specimen
 from magbend.sim import MagnetField, Support, UniformField, gmc
 from magbend.sim.navigate import Lumen, Wall, channel, navigate, polyline, read_lumen
+from magbend.sim.navigate.curves import outline
 
 LUMENS = Path(__file__).parents[3] / "fixtures" / "lumens"
 NOTHING = UniformField(flux_mT=0.0)
@@ -160,3 +162,39 @@ def test_weight_across_the_lumen_is_refused():
     lumen = channel("tube", width_mm=3.0, legs=[(40.0, 0.0)])
     with pytest.raises(ValueError, match="a floor would carry it"):
         navigate(gmc(2), lumen, NOTHING, support=Support(gravity_m_s2=(0.0, 0.0, -9.8)))
+
+
+def crossings(shape, line) -> int:
+    """Count where one polyline crosses another, by the signs of areas."""
+    a, b = shape[:-1, None], shape[1:, None]
+    c, d = line[None, :-1], line[None, 1:]
+
+    def area(p, q, r):
+        return (q - p)[..., 0] * (r - p)[..., 1] - (q - p)[..., 1] * (r - p)[..., 0]
+
+    apart = area(a, b, c) * area(a, b, d) < 0.0
+    return int((apart & (area(c, d, a) * area(c, d, b) < 0.0)).sum())
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_rod_passes_a_wall_in_lumens_nobody_chose(seed):
+    rng = np.random.default_rng(1000 + seed)
+    legs = [(3.0, 0.0)]
+    while sum(length for length, _ in legs) < 40.0:
+        legs.append((float(rng.uniform(5.0, 12.0)), float(rng.uniform(-110.0, 110.0))))
+    rod = gmc(int(rng.integers(1, 8)))
+    lumen = channel(
+        "any",
+        width_mm=rod.side_mm * float(rng.uniform(1.3, 2.5)),
+        legs=legs,
+        mode=str(rng.choice(["feed", "push"])),
+    )
+    passage = navigate(
+        rod, lumen, UniformField(flux_mT=float(rng.uniform(-80.0, 80.0))),
+        friction=float(rng.choice([0.0, 0.3])), push_limit_N=0.5, refine=False,
+    )  # fmt: skip
+    assert len(passage.steps) > 10
+    for step in passage.steps:
+        shape = step.shape[:2].T
+        assert all(crossings(shape, outline(wall.arcs)) == 0 for wall in lumen.walls)
+        assert step.overlap_mm < 1e-2
