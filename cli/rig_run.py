@@ -279,6 +279,11 @@ def _readings_mT(text: str, gaps_mm: tuple[float, ...]) -> dict[float, float] | 
             f"--flux-mT must give one reading a gap ({len(gaps_mm)}); instead received "
             f"{len(values)}"
         )
+    if len(set(gaps_mm)) != len(gaps_mm):
+        raise InputError(
+            "--flux-mT gives readings by gap, and this plan visits a gap more than "
+            "once; leave it out and type each reading when you are asked"
+        )
     return dict(zip(gaps_mm, values, strict=True))
 
 

@@ -37,6 +37,7 @@ def print_dry_run(plan: Plan, as_json: bool) -> None:
         rows.append(
             {
                 "index": step.index,
+                "kind": step.kind,
                 "gap_mm": step.gap_mm,
                 "stage_mm": step.stage_mm,
                 "move_mm": step.move_mm,
@@ -58,7 +59,9 @@ def print_dry_run(plan: Plan, as_json: bool) -> None:
         )
         return
     typer.echo(f"{plan.model.name}: {plan.specimen.name} on {plan.rig.name}")
-    typer.echo("step  gap mm  stage mm  move mm   time s  flux mT  tip x, y mm")
+    typer.echo(
+        "step kind         gap mm  stage mm  move mm   time s  flux mT  tip x, y mm"
+    )
     for row in rows:
         typer.echo(_dry_line(row))
     if plan.rig.magnet is not None:
@@ -88,7 +91,7 @@ def _weight(plan: Plan) -> str:
 def _dry_line(row: dict[str, Any]) -> str:
     stage = "-" if row["stage_mm"] is None else f"{row['stage_mm']:.2f}"
     line = (
-        f"{row['index'] + 1:4d} {row['gap_mm']:7.2f} {stage:>9} "
+        f"{row['index'] + 1:4d} {row['kind']:<11} {row['gap_mm']:7.2f} {stage:>9} "
         f"{row['move_mm']:8.2f} {row['time_s']:8.1f}"
     )
     if row["predicted_flux_mT"] is None:

@@ -23,7 +23,10 @@ from ...core.units import GRAVITY_M_PER_S2
 from ..camera.config import CameraConfig
 from ..meter.config import MeterConfig
 from ..stage.config import LimitsConfig, StageConfig
+from .stops import FAR, Order, Route, Stop, Sweep, out_of_order, stops_of
 from .twin_config import TwinConfig
+
+_MOST_STOPS = 10_000
 
 
 class SettleConfig(FileModel):
@@ -41,9 +44,14 @@ class SettleConfig(FileModel):
 
 
 class PhotographConfig(FileModel):
-    """The ``[photograph]`` table: how many frames make one photograph (median)."""
+    """The ``[photograph]`` table: how many frames make one photograph (median).
+
+    After it `series` single frames are kept too, `interval_s` apart.
+    """
 
     frames: int = Field(default=3, ge=1, le=99)
+    series: int = Field(default=0, ge=0, le=1000)
+    interval_s: NonNegativeFloat = 0.2
 
 
 class FluxConfig(FileModel):
@@ -51,9 +59,11 @@ class FluxConfig(FileModel):
 
     Each reading is held against the magnet of the rig file within `magnet_percent`, and
     against the earlier readings of its run within `run_percent`; what disagrees is
-    flagged, and by `policy` the run pauses or ends after that step.
+    flagged, and by `policy` the run pauses or ends after that step. With `baseline` the
+    run ends far from the magnet, with a last reading for the meter's drift.
     """
 
+    baseline: bool = False
     samples: int = Field(default=5, ge=1, le=10_000)
     policy: Literal["flag", "pause", "abort"] = "flag"
     magnet_percent: PositiveFloat = 5.0
@@ -113,6 +123,11 @@ class PlanModel(FileModel):
     specimen: Path
     rig: Path
     gaps_mm: list[PositiveFloat] = Field(min_length=1, max_length=1000)
+    order: Order = "falling"
+    sweep: Sweep = "approach"
+    repeats: int = Field(default=1, ge=1, le=1000)
+    reference: bool = False
+    reference_gap_mm: PositiveFloat | None = None
     settle: SettleConfig | None = None
     photograph: PhotographConfig = PhotographConfig()
     flux: FluxConfig = FluxConfig()
@@ -154,9 +169,14 @@ class Plan:
     settle: SettleConfig
 
     @property
+    def stops(self) -> tuple[Stop, ...]:
+        """Every step of the run, in turn."""
+        return _stops(self.model, self.rig)
+
+    @property
     def gaps_mm(self) -> tuple[float, ...]:
-        """The gaps in the order in which they are approached, in mm."""
-        return tuple(self.model.gaps_mm)
+        """The gaps of all steps in turn, in mm."""
+        return tuple(stop.gap_mm for stop in self.stops)
 
     @property
     def gravity_m_s2(self) -> Vector:
@@ -168,6 +188,8 @@ class Plan:
         """Return the plan as the manifest of a run keeps it, defaults written out."""
         data = self.model.model_dump(mode="json")
         data.pop("specimen")
+        data["gaps_mm"] = list(self.gaps_mm)
+        data["stops"] = [stop.kind for stop in self.stops]
         data["rig"] = self.rig_path.name
         data["settle"] = self.settle.model_dump(mode="json")
         return data
@@ -221,19 +243,44 @@ def _check_gaps(
 ) -> None:
     line = line_of(text, ("gaps_mm",))
     where = f"{path}, line {line}" if line else f"{path}"
-    before = math.inf
-    for index, gap_mm in enumerate(model.gaps_mm):
-        named = f"gaps_mm[{index}] = {gap_mm:g} mm"
+    stops = _stops(model, rig)
+    if len(stops) > _MOST_STOPS:
+        raise ConfigError(
+            f"{where}: repeats and sweeps unfold to {len(stops)} steps; at most "
+            f"{_MOST_STOPS} are taken in one run"
+        )
+    gaps = [(f"gaps_mm[{i}]", gap_mm) for i, gap_mm in enumerate(model.gaps_mm)]
+    far = [("reference_gap_mm", s.gap_mm) for s in stops if s.kind in FAR]
+    for name, gap_mm in [*gaps, *far]:
         found = _why_not_there(gap_mm, rig)
         if found:
             reason, keys = found
-            raise ConfigError(f"{where}: {named} {reason} ({rig_path.name}, {keys})")
-        if gap_mm >= before:
             raise ConfigError(
-                f"{where}: gaps_mm must fall, so that the magnet is approached from "
-                f"the far side only; instead {named} follows {before:g} mm"
+                f"{where}: {name} = {gap_mm:g} mm {reason} ({rig_path.name}, {keys})"
             )
-        before = gap_mm
+    wrong = out_of_order(model.gaps_mm) if model.order == "falling" else None
+    if wrong is not None:
+        raise ConfigError(
+            f"{where}: gaps_mm must fall, so that the magnet is approached from the "
+            f"far side only; instead gaps_mm[{wrong}] = {model.gaps_mm[wrong]:g} mm "
+            f"follows {model.gaps_mm[wrong - 1]:g} mm; for the way back write sweep = "
+            '"return", for an order of your own order = "free"'
+        )
+
+
+def _stops(model: PlanModel, rig: RigModel) -> tuple[Stop, ...]:
+    far_mm = model.reference_gap_mm or rig.limits.max_gap_mm
+    return stops_of(
+        Route(
+            gaps_mm=model.gaps_mm,
+            order=model.order,
+            sweep=model.sweep,
+            repeats=model.repeats,
+            far_mm=far_mm,
+            reference=model.reference,
+            baseline=model.flux.baseline,
+        )
+    )
 
 
 def _why_not_there(gap_mm: float, rig: RigModel) -> tuple[str, str] | None:

@@ -20,6 +20,8 @@ class PlannedStep:
     ----------
     index : int
         From 0.
+    kind : str
+        As `bench.stops.Stop` has it.
     gap_mm : float
         The gap.
     stage_mm : float or None
@@ -31,6 +33,7 @@ class PlannedStep:
     """
 
     index: int
+    kind: str
     gap_mm: float
     stage_mm: float | None
     move_mm: float
@@ -47,17 +50,22 @@ def plan_steps(plan: Plan) -> tuple[PlannedStep, ...]:
     fixed_s = (
         settle.time_s + still_s + plan.model.flux.samples * _SAMPLE_S
         + plan.model.photograph.frames * _FRAME_S + _RECORD_S
+        + plan.model.photograph.series * plan.model.photograph.interval_s
     )  # fmt: skip
     acceleration = stage.acceleration_mm_s2 or 10.0
     speed_mm_s = stage.feed_mm_min / 60.0
     here_mm, zero = limits.max_gap_mm, stage.gap_at_zero_mm
     steps = []
-    for index, gap_mm in enumerate(plan.gaps_mm):
+    for index, stop in enumerate(plan.stops):
+        gap_mm = stop.gap_mm
         move_mm = here_mm - gap_mm
-        move_s = move_mm / speed_mm_s + speed_mm_s / acceleration if move_mm else 0.0
+        move_s = (
+            abs(move_mm) / speed_mm_s + speed_mm_s / acceleration if move_mm else 0.0
+        )
         steps.append(
             PlannedStep(
                 index=index,
+                kind=stop.kind,
                 gap_mm=gap_mm,
                 move_mm=move_mm,
                 time_s=move_s + fixed_s,

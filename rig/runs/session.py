@@ -16,6 +16,7 @@ from ...core.errors import MagbendError, RigError, StageError
 from ...core.progress import Progress
 from ..bench.config import Plan
 from ..bench.devices import Devices
+from ..bench.stops import FAR, Stop
 from ..camera.photo_flags import photo_flags
 from ..camera.protocol import brightness, encode_png, grab_median
 from ..errors import StoppedError
@@ -97,7 +98,9 @@ class Session:
             self.readings = [
                 (step["gap_mm"], step["flux_mT"])
                 for step in steps
-                if step.get("flux_mT") is not None and FLAG not in step["flags"]
+                if step.get("flux_mT") is not None
+                and FLAG not in step["flags"]
+                and step.get("kind") not in FAR
             ]
             self._say("checking", f"checking the position at {last['gap_mm']:g} mm")
             check = verify_position(
@@ -106,14 +109,14 @@ class Session:
             self.folder.start_session({"position_check": check})
 
     def _take_steps(self, progress: Progress) -> None:
-        gaps_mm = self.plan.gaps_mm
-        progress(len(self.folder.done), len(gaps_mm))
+        stops = self.plan.stops
+        progress(len(self.folder.done), len(stops))
         left = TimeLeft(self.plan, self.folder.done)
         self.state.expect_end(left.now_s())
-        for index, gap_mm in enumerate(gaps_mm):
+        for index, stop in enumerate(stops):
             if index in self.folder.done:
                 continue
-            record = self._take_step(index, gap_mm)
+            record = self._take_step(index, stop)
             self.flagged += [f"step {index}: {flag}" for flag in record["flags"]]
             self.state.expect_end(left.after(index))
             self.state.tell(
@@ -122,12 +125,12 @@ class Session:
                 flags=record["flags"],
                 picture=str(self.folder.path.resolve() / image_name(index)),
             )
-            self._say("idle", step_line(record, len(gaps_mm)))
-            progress(len(self.folder.done), len(gaps_mm))
+            self._say("idle", step_line(record, len(stops)))
+            progress(len(self.folder.done), len(stops))
             self._heed(record)
 
-    def _take_step(self, index: int, gap_mm: float) -> Record:
-        devices, plan = self.devices, self.plan
+    def _take_step(self, index: int, stop: Stop) -> Record:
+        devices, plan, gap_mm = self.devices, self.plan, stop.gap_mm
         self.state.tell(step=index + 1, state="moving")
         was_paused = self._pause()
         move, was_held = self._go_to(gap_mm)
@@ -156,6 +159,8 @@ class Session:
         )  # fmt: skip
         record: Record = {
             "index": index,
+            "kind": stop.kind,
+            "turn": stop.turn,
             "gap_mm": gap_mm,
             "gap_reached_mm": move.gap_mm,
             "stage_mm": move.stage_mm,
@@ -178,9 +183,26 @@ class Session:
             "monotonic_s": devices.clock.monotonic_s(),
             "flags": flags,
         }
-        return self.folder.commit_step(
-            record, {image_name(index): encode_png(frame.image)}
-        )
+        images = {image_name(index): encode_png(frame.image)}
+        if plan.model.photograph.series:
+            record["series"] = self._take_series(index, images)
+            self._require_standing(move)
+        return self.folder.commit_step(record, images)
+
+    def _take_series(self, index: int, images: dict[str, bytes]) -> list[Record]:
+        """Add single frames to the pictures of a step; return when each was taken."""
+        photograph, camera = self.plan.model.photograph, self.devices.camera
+        clock, taken = self.devices.clock, list[Record]()
+        after_s = clock.monotonic_s()
+        for number in range(photograph.series):
+            frame = camera.grab_after(after_s, check=self._check)
+            name = image_name(index).replace(".png", f"_s{number:03d}.png")
+            images[name] = encode_png(frame.image)
+            taken.append(
+                {"path": name, "time_utc": frame.time_utc, "arrival_s": frame.arrival_s}
+            )
+            after_s = max(frame.arrival_s, after_s + photograph.interval_s)
+        return taken
 
     def _go_to(self, gap_mm: float) -> tuple[MoveRecord, bool]:
         """Go to a gap; a pause stops the stage on its way, and it goes on after.
@@ -210,7 +232,8 @@ class Session:
         """Take a reading in; where it disagrees do as the plan's policy says."""
         sentence = record["field"]["sentence"]
         if not sentence:
-            if record["flux_mT"] is not None:
+            # Far from the magnet a reading is too small to judge others by.
+            if record["flux_mT"] is not None and record["kind"] not in FAR:
                 self.readings.append((record["gap_mm"], record["flux_mT"]))
             return
         self.report(f"step {record['index'] + 1}: {sentence}")
