@@ -79,6 +79,36 @@ from .package.crate import (
 from .package.crate import (
     write_package as write_package,
 )
+from .recipe.law import (
+    Law as Law,
+)
+from .recipe.law import (
+    Prediction as Prediction,
+)
+from .recipe.law import (
+    fit_law as fit_law,
+)
+from .recipe.law import (
+    predict_mixture as predict_mixture,
+)
+from .recipe.law import (
+    read_law as read_law,
+)
+from .recipe.law import (
+    write_law as write_law,
+)
+from .recipe.material import (
+    Mixture as Mixture,
+)
+from .recipe.material import (
+    mixtures as mixtures,
+)
+from .recipe.material import (
+    read_ratio as read_ratio,
+)
+from .recipe.rods import (
+    fit_rods as fit_rods,
+)
 from .report.build import (
     write_report as write_report,
 )

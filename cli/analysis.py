@@ -8,6 +8,7 @@ from . import (
     analysis_model,
     analysis_out,
     analysis_runs,
+    recipe,
 )
 from .console import group
 
@@ -22,3 +23,4 @@ analysis_fit.register(app)
 analysis_import.register(app)
 analysis_model.register(app)
 analysis_out.register(app)
+app.add_typer(recipe.app)

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ..analysis.design.goals import Goal
     from ..analysis.design.makeable import Makeable
     from ..analysis.design.search import Design
+    from ..core.specimen import Specimen
     from ..sim import Field
 
 EXAMPLE = "Example: magbend analysis design --radius-mm 100 --field-mT 50 --count 5"
@@ -73,6 +74,9 @@ def design(
     recipes: bool = typer.Option(
         False, "--recipes", help="Only the paper's materials and moulds."
     ),
+    recipe: Path | None = typer.Option(
+        None, "--recipe", help="Only what a law of mixing can mix: recipe.json."
+    ),
     seed: int = typer.Option(0, "--seed", min=0, help="Seed of the search."),
     figure: Path | None = typer.Option(
         None, "--figure", help="Draw the expected shapes with bands (.svg .pdf .png)."
@@ -107,7 +111,7 @@ def design(
         "unit_length_mm": _range(unit_length_mm, "--unit-length-mm"),
         "remanence_mT": remanence_mT,
     }
-    limits = _makeable(makeable, options, recipes, goal)
+    limits = _makeable(makeable, options, recipes, recipe, goal)
     if out is not None:
         output_folder(out)
     found = designing.design(goal, field, limits, count=count, seed=seed)
@@ -200,11 +204,16 @@ def _range(text: str | None, option: str) -> tuple[float, float] | None:
 
 
 def _makeable(
-    path: Path | None, options: dict[str, object], recipes: bool, goal: Goal
+    path: Path | None,
+    options: dict[str, object],
+    recipes: bool,
+    law: Path | None,
+    goal: Goal,
 ) -> Makeable:
     from pydantic import ValidationError
 
-    from ..analysis.design import goals, makeable
+    from ..analysis import read_law
+    from ..analysis.design import goals, makeable, mixtures
     from ..core.errors import InputError
     from ..core.toml import read_toml
 
@@ -215,6 +224,13 @@ def _makeable(
     length_mm = goals.curve_length_mm(goal)
     if length_mm is not None:
         data["total_length_mm"] = (length_mm, length_mm)
+    if recipes and law is not None:
+        raise InputError("give --recipes (the paper's) or --recipe (yours), not both")
+    if law is not None:
+        sections = makeable.Makeable.model_validate(data).sections
+        data["recipe"] = [
+            dict(one) for one in mixtures.mixed_recipes(read_law(law), sections)
+        ]
     if recipes:
         data["recipe"] = [dict(recipe) for recipe in makeable.PAPER_RECIPES]
         data["sides_mm"] = list(makeable.PAPER_SIDES_MM)
@@ -241,6 +257,13 @@ def _write(found: list[Design], out: Path) -> None:
         write_text(out / f"design_{number}.json", text)
 
 
+def _mixed(rod: Specimen) -> str:
+    recipe = dict(rod.recipe)
+    if not recipe:
+        return ""
+    return f" (PCL {recipe['pcl']}, NdFeB {recipe['ndfeb']:g} %)"
+
+
 def _print(found: list[Design], goal: Goal) -> None:
     unit = {"radius": "mm", "angle": "deg"}.get(goal.kind, "mm")
     share = "%" if goal.kind in ("radius", "angle") else "mm"
@@ -251,6 +274,6 @@ def _print(found: list[Design], goal: Goal) -> None:
         lengths = "-".join(f"{s.length_mm:.4g}" for s in rod.sections)
         typer.echo(
             f"{number}. side {rod.side_mm:.4g} mm, {moduli} MPa, {lengths} mm, "
-            f"{rod.remanence_mT:g} mT: {one.achieved:.5g} {unit}, "
+            f"{rod.remanence_mT:g} mT{_mixed(rod)}: {one.achieved:.5g} {unit}, "
             f"error {one.error:.2g} {share}, tolerance {one.tolerance:.2g} {unit}"
         )

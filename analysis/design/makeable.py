@@ -8,6 +8,7 @@ Discrete ones (recipes of material, moulds of given side) are a number a design.
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -34,6 +35,7 @@ class Recipe(FileModel):
     name: str
     E_MPa: list[PositiveFloat] = Field(min_length=1)
     remanence_mT: float
+    mixture: dict[str, float | str] = Field(default_factory=dict)
 
 
 class Scatter(FileModel):
@@ -179,6 +181,16 @@ def designs_in(rods_: dict[str, Array], field: LoadField) -> Designs:
         remanence_mT=rods_["remanence_mT"], flux_mT=flux, angle_deg=angle,
         magnet=magnet, gap_mm=gap,
     )  # fmt: skip
+
+
+def mixture_of(makeable: Makeable, specimen: Specimen) -> dict[str, float | str]:
+    """Return what a design is mixed from; nothing where its moduli are free."""
+    moduli = [section.E_MPa for section in specimen.sections]
+    for recipe in makeable.recipe:
+        close = np.allclose(recipe.E_MPa, moduli, atol=1e-3)
+        if close and math.isclose(recipe.remanence_mT, specimen.remanence_mT):
+            return recipe.mixture
+    return {}
 
 
 def specimen_of(rods_: dict[str, Array], i: int, name: str) -> Specimen:

@@ -31,6 +31,7 @@ from .makeable import (
     choices,
     designs_in,
     dimension,
+    mixture_of,
     rods,
     scattered,
     specimen_of,
@@ -129,7 +130,14 @@ def design(
             designs.append(one)
     designs.sort(key=lambda d: (round(10.0 * d.error / limit), d.tolerance))
     return [
-        replace(one, specimen=replace(one.specimen, name=f"design {number}"))
+        replace(
+            one,
+            specimen=replace(
+                one.specimen,
+                name=f"design {number}",
+                recipe=tuple(mixture_of(makeable, one.specimen).items()),
+            ),
+        )
         for number, one in enumerate(designs, start=1)
     ]
 

@@ -5,23 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ... import sim
+from ..recipe.material import POWDER_T, Mixture
 from .finding import Finding
 from .probe import fit_standoff, read_probe_csv
 
-NDFEB_KG_M3, PCL_KG_M3 = 7500.0, 1145.0
-"""Densities of NdFeB powder (7.4 to 7.6 g/cm3 in data sheets) and of PCL."""
-
-POWDER_T = 0.75
-"""Remanence of an isotropic NdFeB powder once magnetised (MQP grades: 0.7 to 0.9 T)."""
-
 RIGID_SHARES = {"2:1": 1.0 / 3.0, "5:1": 1.0 / 6.0, "6:1": 1.0 / 7.0}
 """Weight of the rigid PCL in the mixture of soft and rigid, from root to tip."""
-
-
-def volume_share(weight_ratio: float) -> float:
-    """Return the volume share of NdFeB mixed `weight_ratio`:1 by weight with PCL."""
-    filler = weight_ratio / NDFEB_KG_M3
-    return filler / (filler + 1.0 / PCL_KG_M3)
 
 
 def standoff() -> list[Finding]:
@@ -64,7 +53,11 @@ def one_recipe() -> list[Finding]:
 
 def filler() -> list[Finding]:
     """Compare magnetisations with the volume of magnetic powder."""
-    shares = np.array([volume_share(ratio) for ratio in (2.0, 1.5, 1.0)])
+    powders = (200.0, 150.0, 100.0)
+    shares = np.array([
+        Mixture(soft_per_rigid=5.0, ndfeb_percent=powder).volume_share
+        for powder in powders
+    ])  # fmt: skip
     read = np.array([sim.gmc(number).remanence_mT for number in (2, 4, 5)])
     off = 100.0 * float(np.max(np.abs(read / read[0] / (shares / shares[0]) - 1.0)))
     expected_mT = 1e3 * POWDER_T * shares[0]

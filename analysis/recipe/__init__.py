@@ -1,0 +1,1 @@
+"""From mixing ratios to modulus and remanence."""
