@@ -31,8 +31,20 @@ from .bench.open import (
 from .bench.template import (
     write_templates as write_templates,
 )
+from .camera.capture import (
+    Source as Source,
+)
+from .camera.config import (
+    CameraConfig as CameraConfig,
+)
+from .camera.protocol import (
+    Image as Image,
+)
 from .camera.protocol import (
     encode_png as encode_png,
+)
+from .clock import (
+    Check as Check,
 )
 from .clock import (
     Clock as Clock,
@@ -45,6 +57,9 @@ from .clock import (
 )
 from .clock import (
     SystemClock as SystemClock,
+)
+from .clock import (
+    go_on as go_on,
 )
 from .control.client import NobodyError as NobodyError
 from .control.client import ask as ask
@@ -59,14 +74,35 @@ from .errors import NotStoppedError as NotStoppedError
 from .errors import PositionLostError as PositionLostError
 from .errors import StageTimeoutError as StageTimeoutError
 from .errors import StoppedError as StoppedError
+from .link import (
+    Link as Link,
+)
+from .meter.config import (
+    MeterConfig as MeterConfig,
+)
 from .meter.description import (
     ready_meters as ready_meters,
+)
+from .meter.protocol import (
+    Flux as Flux,
+)
+from .meter.protocol import (
+    Meter as Meter,
+)
+from .meter.protocol import (
+    Sample as Sample,
+)
+from .meter.protocol import (
+    combine as combine,
 )
 from .ports import (
     PortInfo as PortInfo,
 )
 from .ports import (
     list_ports as list_ports,
+)
+from .ports import (
+    resolve_port as resolve_port,
 )
 from .runs.control import RunControl as RunControl
 from .runs.dry_run import (
@@ -127,8 +163,20 @@ from .stage.make import (
 from .stage.marlin.stage import (
     MarlinStage as MarlinStage,
 )
+from .stage.polled import (
+    Answer as Answer,
+)
+from .stage.polled import (
+    PolledStage as PolledStage,
+)
 from .stage.protocol import (
     Stage as Stage,
+)
+from .stage.protocol import (
+    StageIdentity as StageIdentity,
+)
+from .stage.protocol import (
+    StageLimits as StageLimits,
 )
 from .stage.stop_request import stopping as stopping
 from .wire_log import WireLog as WireLog

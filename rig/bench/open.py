@@ -7,8 +7,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from ...core.errors import CameraError, ConfigError, MeterError
+from ...core.plugin_options import checked_options
+from ...core.plugins import load_plugin, offered
 from ..camera.capture import CaptureCamera, Source
-from ..camera.config import CameraConfig
+from ..camera.config import OWN_BACKENDS, CameraConfig
 from ..camera.protocol import Camera, NoCamera
 from ..clock import Clock
 from ..meter.config import MeterConfig
@@ -47,6 +49,12 @@ def open_camera(config: CameraConfig, folder: Path, clock: Clock) -> Camera:
         raise ConfigError(
             "camera.backend twin is the computed bench: it needs the twin's devices "
             "(magbend.analysis.twin.bench)"
+        )
+    if backend not in OWN_BACKENDS:
+        plugin = load_plugin("magbend.cameras", backend, own=OWN_BACKENDS)
+        options = checked_options(plugin, config.options, "camera.options")
+        return CaptureCamera(
+            lambda: plugin(config, options, clock), str(source), config, clock
         )
     if backend != "opencv":
         _refuse_settings(config, backend)
@@ -152,6 +160,12 @@ def open_meter(
             "meter.driver twin is the computed bench: it needs the twin's devices "
             "(magbend.analysis.twin.bench)"
         )
+    if config.driver in offered("magbend.meters"):
+        plugin = load_plugin("magbend.meters", config.driver)
+        meter: Meter = plugin(
+            config, checked_options(plugin, config.options, "meter.options")
+        )
+        return meter
     from ..meter.description import read_description
     from ..meter.serial import SerialMeter
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from ...core.toml import FileModel
 from ..ports import allowed_port
@@ -20,6 +20,7 @@ class MeterConfig(FileModel):
     description: Path | None = None
     zero_mT: float = 0.0
     sign: Literal[-1, 1] = 1
+    options: dict[str, Any] = Field(default_factory=dict)
 
     @field_validator("port")
     @classmethod

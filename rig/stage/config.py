@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import (
     Field,
@@ -13,8 +13,13 @@ from pydantic import (
     model_validator,
 )
 
+from ...core.plugins import offered
 from ...core.toml import FileModel
 from ..ports import allowed_port, twin_under
+
+OWN_DRIVERS = ("grbl", "marlin")
+GROUP = "magbend.stages"
+"""Entry points by which other packages offer drivers."""
 
 PositiveNumber = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
@@ -39,7 +44,7 @@ class StageConfig(FileModel):
     """
 
     network: bool = False
-    driver: Literal["grbl", "marlin"] = "grbl"
+    driver: str = "grbl"
     port: str = "auto"
     baud: int = Field(default=115200, gt=0)
     axis: Literal["X", "Y", "Z"] = "X"
@@ -62,6 +67,7 @@ class StageConfig(FileModel):
     max_feed_mm_min: PositiveNumber | None = None
     acceleration_mm_s2: PositiveNumber | None = None
     settings: dict[str, float] = Field(default_factory=dict)
+    options: dict[str, Any] = Field(default_factory=dict)
     measured: MeasuredConfig | None = None
     _folder: Path = PrivateAttr(default=Path())
 
@@ -80,6 +86,23 @@ class StageConfig(FileModel):
     @classmethod
     def _may_be_named(cls, port: str, info: ValidationInfo) -> str:
         return allowed_port(port, network=info.data.get("network", False))
+
+    @field_validator("driver")
+    @classmethod
+    def _driver_is_offered(cls, driver: str) -> str:
+        if driver not in OWN_DRIVERS and driver not in offered(GROUP):
+            known = ", ".join(sorted({*OWN_DRIVERS, *offered(GROUP)}))
+            raise ValueError(f"must be one of {known}; instead received {driver!r}")
+        return driver
+
+    @model_validator(mode="after")
+    def _options_are_of_the_driver(self) -> StageConfig:
+        if self.options and self.driver in OWN_DRIVERS:
+            raise ValueError(
+                f"[stage.options] is for drivers of other packages; {self.driver} has "
+                "none"
+            )
+        return self
 
     @model_validator(mode="after")
     def _home_command_is_a_homing(self) -> StageConfig:

