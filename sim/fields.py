@@ -8,18 +8,23 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.centreline import Centreline
+from ..core.centreline import COLUMNS, Centreline
 from ..core.checks import listed, shown, size, store, vector, within
 from ..core.errors import InputError
 from ..core.magnet import Magnet
+from ..core.notebook import Tabular, axes_or_new, plot_line
 from ..core.sources import FLUX_LIMIT_T, Cuboid, Source, Uniform
 from ..core.specimen import Specimen
 from ..core.units import cos_deg
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
 
 GRAVITY_LIMIT_M_S2 = 1000.0
 """Weight beyond about a hundred g is refused as a mistaken unit."""
@@ -350,7 +355,7 @@ class Support:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Solution:
+class Solution(Tabular):
     """The equilibrium that the rod reaches when its load grows from zero.
 
     Parameters
@@ -385,3 +390,19 @@ class Solution:
     root_moment_Nm: float
     load_limit: float = 1.0
     stable_in_space: bool | None = None
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the centreline as a table, a row a point; empty without a shape."""
+        import pandas as pd
+
+        line = self.centreline
+        return pd.DataFrame(
+            {name: getattr(line, name) for name in COLUMNS} if line else {}
+        )
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the shape into `ax`, or into new axes of pyplot; return them."""
+        ax = axes_or_new(ax, "x (mm)", "y (mm)")
+        if self.centreline is not None:
+            plot_line(ax, self.centreline, label=self.status)
+        return ax

@@ -21,12 +21,14 @@ from ...core.derived import note_derived
 from ...core.errors import InputError, StoreError
 from ...core.files import write_text
 from ...core.magnet import Magnet
+from ...core.notebook import Tabular, axes_or_new, plot_line
 from ...core.specimen import Specimen
 from ..runs.load import Frame, RunData, Step
 from . import metrics
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
 MODELS = ("uniform", "magnet")
 IMPORTED = "imported"
@@ -155,7 +157,7 @@ class Comparison:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RunComparison:
+class RunComparison(Tabular):
     """All comparisons of one run.
 
     Attributes
@@ -182,6 +184,29 @@ class RunComparison:
     def models(self) -> tuple[str, ...]:
         """The field models, and the imported one where a step has it."""
         return (*MODELS, IMPORTED) if self.of(IMPORTED) else MODELS
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the rows of ``comparison.csv``, a row a step and model."""
+        return comparison_table([self])
+
+    def plot(self, ax: Axes | None = None, *, model: str = "magnet") -> Axes:
+        """Draw measured dots and the lines of a model into `ax`, or new axes."""
+        ax = axes_or_new(ax, "x (mm)", "y (mm)")
+        for number, comparison in enumerate(self.of(model)):
+            colour = f"C{number}"
+            solved = comparison.solution.centreline if comparison.solution else None
+            seen = comparison.frame.centreline if comparison.frame else None
+            name = f"{comparison.step.flux_mT:.3g} mT"
+            if solved is not None:
+                plot_line(ax, solved, color=colour, label=f"{name}, {model}")
+            if seen is not None:
+                every = max(1, len(seen.s_mm) // 30)
+                plot_line(
+                    ax, seen, color=colour, marker="o", linestyle="none",
+                    markersize=3, markevery=every, label=f"{name}, measured",
+                )  # fmt: skip
+        ax.legend()
+        return ax
 
     def of(self, model: str) -> tuple[Comparison, ...]:
         """Return the comparisons of one field model."""

@@ -11,12 +11,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import within
 from ...core.errors import SolverError
+from ...core.notebook import Tabular, axes_or_new
 from ...core.specimen import Specimen
 from ...core.specimen_file import specimen_dict
 from ...sim import Field, solve
@@ -37,6 +39,10 @@ from .makeable import (
     specimen_of,
 )  # fmt: skip
 
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
 Array = NDArray[np.float64]
 
 STARTS = 2048
@@ -50,7 +56,7 @@ _DIFFERENCE = 1e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Design:
+class Design(Tabular):
     """A rod that gives the wanted shape.
 
     Parameters
@@ -84,6 +90,34 @@ class Design:
     tip_tolerance_mm: float
     shape_mm: Array
     band_mm: Array
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the design as a table of one row."""
+        import pandas as pd
+
+        row: dict[str, float] = {"side_mm": self.specimen.side_mm}
+        for i, section in enumerate(self.specimen.sections, start=1):
+            row |= {f"length{i}_mm": section.length_mm, f"E{i}_MPa": section.E_MPa}
+        row |= {
+            "remanence_mT": self.specimen.remanence_mT,
+            "achieved": self.achieved,
+            "error": self.error,
+            "tolerance": self.tolerance,
+            "tip_x_mm": self.tip_mm[0],
+            "tip_y_mm": self.tip_mm[1],
+            "tip_angle_deg": self.tip_angle_deg,
+            "radius_mm": self.radius_mm,
+        }
+        return pd.DataFrame([row])
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the shape and what fabrication scatter makes of it; return the axes."""
+        ax = axes_or_new(ax, "x (mm)", "y (mm)")
+        for shape in self.band_mm[:40]:
+            ax.plot(*shape.T, color="C0", alpha=0.1, linewidth=0.6)
+        ax.plot(*self.shape_mm.T, color="C0", label=self.specimen.name)
+        ax.set_aspect("equal", adjustable="datalim")
+        return ax
 
 
 def design(

@@ -86,7 +86,8 @@ def _draw_points(axes: Axes, frame: Frame, label: str | None) -> Artist:
         fmt="o", color=INK, markerfacecolor="none", markeredgewidth=0.7,
         elinewidth=0.6, label=label,
     )  # fmt: skip
-    return bars[0]
+    line_of_points: Artist = bars[0]
+    return line_of_points
 
 
 def _measured(run: RunComparison) -> list[Comparison]:

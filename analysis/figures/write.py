@@ -137,7 +137,7 @@ def _axis_names(figure: Figure, axes: Axes) -> tuple[str, str]:
 def _series(axes: Axes) -> list[tuple[str, Any, Any, Any, Any]]:
     """Lines and error bars of an axes that mean something: with a label or a gid."""
     found = []
-    within_bars = set()
+    within_bars: set[int] = set()
     for bars in axes.containers:
         line = bars[0] if len(bars) else None
         if line is None or not hasattr(line, "get_xdata"):
@@ -152,7 +152,7 @@ def _series(axes: Axes) -> list[tuple[str, Any, Any, Any, Any]]:
     for line in axes.lines:
         label = str(line.get_label())
         name = line.get_gid() or ("" if label.startswith("_") else label)
-        if name and id(line) not in within_bars and len(line.get_xdata()):
+        if name and id(line) not in within_bars:
             x = np.asarray(line.get_xdata(), float)
             found.append(
                 (str(name), x, np.asarray(line.get_ydata(), float), None, None)

@@ -18,12 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.json import write_json
+from ...core.notebook import Tabular, axes_or_new
 from ...core.specimen import Specimen
 from .linear import Linear, budget, linear_problem, marginal, statistical
 from .problem import Problem
 from .residuals import distances_mm, residuals
 
 if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
     from .posterior import Posterior
     from .verdict import Verdict
 
@@ -37,7 +41,7 @@ PRIOR_RANGE_MPA = (8.0, 50.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FitResult:
+class FitResult(Tabular):
     """The outcome of a fit.
 
     Attributes
@@ -139,6 +143,30 @@ class FitResult:
         """Return the 95 % interval of one modulus."""
         value, sd = self.E_MPa[index], self.E_sd_MPa[index]
         return value - 1.96 * sd, value + 1.96 * sd
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return parameter, value and standard deviation, a row each."""
+        import pandas as pd
+
+        return pd.DataFrame(
+            {
+                "parameter": self.parameters,
+                "value": self.values,
+                "sd": self.sd,
+                "known": [
+                    name not in self.not_identifiable for name in self.parameters
+                ],
+            }
+        )
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the moduli with 95 % intervals into `ax`, or into new axes."""
+        ax = axes_or_new(ax, "section, from the root", "Young's modulus (MPa)")
+        where = range(1, len(self.E_MPa) + 1)
+        reach = [1.96 * sd for sd in self.E_sd_MPa]
+        ax.errorbar(where, self.E_MPa, yerr=reach, fmt="o", capsize=3)
+        ax.set_xticks(list(where))
+        return ax
 
     def as_dict(self) -> dict[str, Any]:
         """Return what ``fit.json`` holds; NaN stands for not identifiable."""

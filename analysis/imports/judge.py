@@ -16,7 +16,7 @@ import numpy as np
 from ...core.centreline import Centreline
 from ...core.errors import InputError
 from ...core.units import unit_factor
-from .order import aligned, arc_length, chained_length, order_of, path_length
+from .order import Indices, aligned, arc_length, chained_length, order_of, path_length
 from .shapes import Array, RawShape
 
 LENGTH_TOLERANCE = 0.03
@@ -185,7 +185,7 @@ def _unit_hint(length: float, length_mm: float) -> str:
     return ""
 
 
-def _ordered(raw: RawShape, order: Array) -> RawShape:
+def _ordered(raw: RawShape, order: Indices) -> RawShape:
     def some(values: Array | None) -> Array | None:
         return None if values is None else values[order]
 

@@ -11,7 +11,7 @@ import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ...core.centreline import Centreline
 from ...core.errors import InputError, StoreError
 from ...core.files import write_bytes
+from ...core.notebook import Tabular, axes_or_new
 from ..compare.metrics import position_at
 from .build import (
     MANIFEST,
@@ -30,6 +31,10 @@ from .build import (
 )
 from .conditions import all_of, known, parse_range, parse_where
 
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
 Array = NDArray[np.float64]
 
 _BOOLE = {25: 32.0 / 90.0, 50: 12.0 / 90.0, 75: 32.0 / 90.0, 100: 7.0 / 90.0}
@@ -38,7 +43,7 @@ _FETCH_LIMIT = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Found:
+class Found(Tabular):
     """What a query found.
 
     Parameters
@@ -55,6 +60,18 @@ class Found:
     matched: int
     designs: int
     missing_partitions: int
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the rows as a pandas table."""
+        frame: pd.DataFrame = self.table.to_pandas()
+        return frame
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw where the tips of the rows found lie; return the axes."""
+        ax = axes_or_new(ax, "tip x (mm)", "tip y (mm)")
+        rows = self.to_dataframe()
+        ax.plot(rows["tip_x_mm"], rows["tip_y_mm"], "o", markersize=3)
+        return ax
 
 
 def query(

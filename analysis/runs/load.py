@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ from pydantic import ValidationError
 from ...core.centreline import Centreline
 from ...core.errors import ConfigError, InputError, StoreError
 from ...core.magnet import Magnet
+from ...core.notebook import Tabular, axes_or_new, plot_line
 from ...core.specimen import Specimen
 from ...core.specimen_file import MagnetModel, SpecimenModel
 from ...rig import Run, check_used, read_run
@@ -37,6 +39,7 @@ from .imported import read_imported
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
 
 _MEASURED = ("frames.csv", "centrelines.csv", "calibration.json")
 _FILES = ("run.json", "steps.jsonl", "end.json", *_MEASURED)
@@ -108,7 +111,7 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RunData:
+class RunData(Tabular):
     """A run with its centrelines.
 
     Attributes
@@ -232,6 +235,25 @@ class RunData:
     def files(self) -> list[Path]:
         """The files that were read, for those who note what a result was made from."""
         return [path for name in _FILES if (path := self.path / name).is_file()]
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return every measured point, a row each: `points_table`."""
+        return self.points_table
+
+    def _repr_html_(self) -> str:
+        steps = self.steps_table.to_html(index=False, border=0, float_format="%.5g")
+        return f"<p>{escape(self.name)}: {escape(self.specimen.name)}</p>{steps}"
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the measured lines into `ax`, or into new axes; return them."""
+        ax = axes_or_new(ax, "x (mm)", "y (mm)")
+        for step in self.steps:
+            frame = self.frame(step)
+            if frame is not None and frame.centreline is not None:
+                name = f"{step.flux_mT:.3g} mT, {step.gap_mm:g} mm"
+                plot_line(ax, frame.centreline, label=name)
+        ax.legend()
+        return ax
 
     def frame(self, step: Step) -> Frame | None:
         """Return what was found in the photograph of `step`, None if not looked at."""

@@ -171,7 +171,9 @@ def _path(grey: NDArray[np.float32], points: Array) -> Array:
     """Return the darkest (or lightest) way through the points, smoothed, in px."""
     factor = max(1.0, max(grey.shape) / _GRID_PX)
     size = (round(grey.shape[1] / factor), round(grey.shape[0] / factor))
-    small = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA))
+    small = np.asarray(
+        cv2.resize(grey, size, interpolation=cv2.INTER_AREA), dtype=np.float32
+    )
     # Of the way along the points against that beside them: dark rod or light.
     straight = _sampled(small, points / factor)
     is_light = float(np.median(straight)) > float(np.median(small)) * 1.2
