@@ -91,7 +91,7 @@ def _measure(photo: Photo, setting: Setting) -> Measurement:
     quick, doubt = None, LostError("no_rod", "nothing stands out from the background")
     try:
         quick = measure_candidate(photo, setting, *find_rod(photo, sought))
-        if TIP_GOES_ON not in quick.flags:
+        if _is_sure(quick):
             return quick
     except LostError as lost:
         doubt = lost
@@ -105,9 +105,20 @@ def _measure(photo: Photo, setting: Setting) -> Measurement:
         if isinstance(lost, LostError) and lost.seen_px:
             raise
         raise _empty(photo) or doubt from None
-    if quick is not None and whole.length_px < quick.length_px:
-        return quick
-    return whole
+    return whole if quick is None else _better(quick, whole)
+
+
+def _is_sure(quick: Measurement) -> bool:
+    """Whether one level of lightness may have shown the whole rod, and no shade."""
+    return TIP_GOES_ON not in quick.flags and "clamp_at_border" not in quick.flags
+
+
+def _better(quick: Measurement, whole: Measurement) -> Measurement:
+    """Return the one of two measurements that is longer, or held by a clamp."""
+    if "clamp_at_border" not in quick.flags:
+        return whole if whole.length_px > quick.length_px else quick
+    held = not {"clamp_at_border", "no_clamp", "rough_edges"} & set(whole.flags)
+    return whole if held else quick
 
 
 def measure_candidate(

@@ -28,6 +28,9 @@ _SIZE = 1.6
 _AS_CLEAR = 0.6
 """Share of the levels, and of the worth, at which another thing is as likely."""
 
+_DARK = 0.25
+"""Light of a rod, over the paper's, that no mix of colours tells much better."""
+
 _SHOWN = 6
 """Things that are drawn on the overlay of a refusal."""
 
@@ -86,7 +89,11 @@ def find_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
         if dark is None:
             raise
         binary, rod = dark, _choose(dark, sought)
-    return rod, View(grey=photo.grey, sign=-1.0 if binary.inverted else 1.0)
+    view = View(grey=photo.grey, sign=-1.0 if binary.inverted else 1.0)
+    if rod.ratio < _DARK or binary.inverted:
+        return rod, view
+    coloured = best_view(photo, rod.points_px, rod.width_px)
+    return rod, view if coloured.mix is None else coloured
 
 
 def search_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:

@@ -1,0 +1,188 @@
+"""The rod among other things, in any light: found, or refused for the true reason."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from magbend.vision import (
+    Pose,
+    Setting,
+    as_photo,
+    draw_overlay,
+    extract,
+    measure,
+    specimen_to_px,
+)
+from magbend.vision.synthetic import (
+    BLACK,
+    GREY,
+    Block,
+    Mark,
+    Rod,
+    Scene,
+    SceneLight,
+    curve,
+    render_scene,
+    scene_camera,
+    signed_distance,
+)
+
+CAMERA = scene_camera(size_px=(800, 600), focal_px=3400.0, target_mm=(0.0, 0.0))
+HEIGHT = 0.9
+CLAMP = Block(
+    pose=Pose(x_mm=-12.0, y_mm=-6.0, angle_deg=6.0, height_mm=HEIGHT),
+    width_mm=8.0, colour=GREY,
+)  # fmt: skip
+LINE = curve("graded", angle_deg=50.0, length_mm=26.0)
+PLAIN = Scene(clamp=CLAMP, centreline=LINE, dust=0)
+GREEN_BOARD, RED = (0.16, 0.30, 0.10), (0.04, 0.04, 0.35)
+GREEN, YELLOW = (0.06, 0.25, 0.05), (0.05, 0.45, 0.55)
+
+
+def picture(scene, camera=CAMERA):
+    return render_scene(scene, camera, np.random.default_rng(5))
+
+
+def measured(scene, **known):
+    return extract(
+        as_photo(picture(scene)), CAMERA, rod_height_mm=HEIGHT, clamp_height_mm=4.0,
+        **known,
+    )  # fmt: skip
+
+
+def bar(x, y, width, height):
+    corners = [[x, y], [x + width, y], [x + width, y + height], [x, y + height]]
+    return np.array(corners, dtype=float)
+
+
+def lying(angle_deg, x_mm, y_mm, length_mm=18.0):
+    pose = Pose(x_mm=x_mm, y_mm=y_mm, angle_deg=angle_deg, height_mm=0.6)
+    return Rod(line=curve("arc", angle_deg=20.0, length_mm=length_mm), pose=pose)
+
+
+CLUTTER = {
+    "a second rod": {"others": (lying(80.0, -14.0, 0.0, 10.0),)},
+    "a pencil line": {
+        "marks": (Mark(outline_mm=bar(-30.0, 11.5, 60.0, 0.4), colour=(0.3,) * 3),)
+    },
+    "a strip of shade": {
+        "marks": (
+            Mark(outline_mm=bar(-30.0, -12.0, 60.0, 3.0), cover=0.5, softness_mm=0.5),
+        )
+    },
+    "grid paper": {
+        "marks": tuple(
+            Mark(outline_mm=bar(x, -20.0, 0.15, 40.0), colour=(0.8, 0.7, 0.5))
+            for x in range(-20, 21, 5)
+        )
+    },
+    "a magnet": {
+        "blocks": (
+            Block(
+                pose=Pose(x_mm=14.0, y_mm=-10.0, angle_deg=90.0), length_mm=4.0,
+                width_mm=5.0, height_mm=5.0, screws_mm=(),
+            ),
+        )
+    },
+    "gloss": {"light": SceneLight(gloss=0.5)},
+    "deep shade": {"light": SceneLight(shadow_depth=0.65, softness=0.1, slope=1.2)},
+    "a red rod on a green board": {"paper": GREEN_BOARD, "rod_colour": RED},
+    "a striped rod": {"rod_colour": GREEN, "rod_stripe": YELLOW},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", CLUTTER)
+def test_the_rod_is_measured_beside(what):
+    found = measured(replace(PLAIN, **CLUTTER[what]))
+    assert found.ok, found.reason
+    points = np.column_stack([found.points["x_mm"], found.points["y_mm"]])
+    assert np.sqrt(np.mean(signed_distance(points, LINE.points_mm) ** 2)) < 0.08
+    assert found.length_mm == pytest.approx(LINE.length_mm, abs=0.08)
+
+
+def test_rods_in_two_clamps_are_refused_and_both_are_drawn():
+    other = Block(
+        pose=Pose(x_mm=-12.0, y_mm=8.0, angle_deg=0.0), width_mm=5.0, colour=BLACK
+    )
+    beside = lying(0.0, -12.0, 8.0)
+    scene = replace(PLAIN, blocks=(other,), others=(beside,))
+    photo = as_photo(picture(scene))
+    found = extract(photo, CAMERA, rod_height_mm=HEIGHT)
+    assert not found.ok
+    assert "two_rods" in found.flags
+    assert len(found.seen_px) >= 2
+    truths = (
+        specimen_to_px(CAMERA, CLAMP.pose, LINE.points_mm),
+        specimen_to_px(CAMERA, beside.pose, beside.line.points_mm),
+    )
+    for truth in truths:
+        near = [abs(signed_distance(seen, truth)).max() for seen in found.seen_px]
+        assert min(near) < 20.0
+    drawn = draw_overlay(photo, found).astype(int)
+    orange = (drawn[..., 2] - drawn[..., 0]) > 120
+    assert orange.sum() > 300
+
+
+def test_a_specimen_tells_its_rod_from_another_in_a_clamp():
+    other = Block(
+        pose=Pose(x_mm=-12.0, y_mm=8.0, angle_deg=0.0), width_mm=5.0, colour=BLACK
+    )
+    beside = lying(0.0, -12.0, 8.0, length_mm=13.0)
+    photo = as_photo(picture(replace(PLAIN, blocks=(other,), others=(beside,))))
+    known = Setting(
+        calibration=CAMERA, rod_height_mm=HEIGHT, clamp_height_mm=4.0,
+        length_mm=26.0, side_mm=1.0,
+    )  # fmt: skip
+    found = measure(photo, known)
+    assert found.ok, found.reason
+    assert found.length_mm == pytest.approx(26.0, abs=0.1)
+
+
+def test_a_rod_that_crosses_another_is_refused():
+    scene = replace(PLAIN, others=(lying(100.0, 4.0, -14.0, length_mm=24.0),))
+    found = measured(scene)
+    assert not found.ok or "tip_goes_on" in found.flags
+
+
+def test_a_rod_that_leaves_the_picture_is_refused():
+    camera = scene_camera(size_px=(800, 600), focal_px=3400.0, target_mm=(-36.0, 0.0))
+    found = extract(as_photo(picture(PLAIN, camera)), camera, rod_height_mm=HEIGHT)
+    assert not found.ok
+    assert {"touches_border", "touches_object"} & set(found.flags)
+
+
+def test_a_rod_that_grows_from_nothing_is_told_so():
+    scene = replace(
+        PLAIN, centreline=None, others=(lying(0.0, -8.0, 0.0),),
+        clamp=replace(CLAMP, pose=replace(CLAMP.pose, x_mm=-90.0)),
+    )  # fmt: skip
+    found = measured(scene)
+    assert found.flags == ("no_clamp",)
+    assert found.seen_px
+
+
+def test_nobody_gave_the_height_of_the_rod():
+    photo = as_photo(picture(PLAIN))
+    assert "height_assumed" in extract(photo, CAMERA).flags
+    for known in (0.0, HEIGHT):
+        assert "height_assumed" not in extract(photo, CAMERA, rod_height_mm=known).flags
+
+
+def test_the_root_is_under_the_edge_that_a_telephone_sees_over_it():
+    """Where the camera looks over the clamp from the side and from near."""
+    near = scene_camera(
+        size_px=(800, 600), focal_px=650.0, height_mm=32.0, tilt_deg=8.0,
+        tilt_direction_deg=150.0, target_mm=(0.0, 0.0),
+    )  # fmt: skip
+    clamp = replace(CLAMP, pose=replace(CLAMP.pose, x_mm=-4.0, y_mm=6.0), height_mm=3.0)
+    line = curve("arc", angle_deg=-30.0, length_mm=14.0)
+    photo = as_photo(picture(replace(PLAIN, clamp=clamp, centreline=line), near))
+    found = extract(photo, near, rod_height_mm=HEIGHT, clamp_height_mm=3.0)
+    assert found.ok, found.reason
+    true = specimen_to_px(near, clamp.pose, line.points_mm[:2])
+    along = (true[1] - true[0]) / np.hypot(*(true[1] - true[0]))
+    assert abs((found.clamp_px - true[0]) @ along) < 0.8
+    assert found.clamp_sd_mm < 0.05
