@@ -25,8 +25,9 @@ from magbend.vision.synthetic import signed_distance
 
 WRONG_RMS_MM, WRONG_TIP_MM = 0.15, 0.5
 DOUBTS = {
-    "direction_doubtful", "clamp_doubtful", "rough_edges", "ragged_tip", "shadow",
-    "overexposed", "root_hidden", "clamp_at_border", "height_doubtful",
+    "direction_doubtful", "clamp_doubtful", "rough_edges", "ragged_tip", "overexposed",
+    "root_hidden", "clamp_at_border", "height_doubtful", "tip_goes_on",
+    "clamp_lines_differ",
 }  # fmt: skip
 
 

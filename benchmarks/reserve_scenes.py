@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from magbend.vision import Calibration, Photo, Pose, as_photo
+from magbend.vision import Calibration, Photo, Pose, as_photo, specimen_to_px
 from magbend.vision.synthetic import (
     BLACK,
     BLUE,
@@ -118,6 +118,9 @@ def _plain(rng: np.random.Generator, camera: Calibration) -> Scene | None:
         return None
     x, y = low + 2.0 - points.min(axis=0) + rng.random(2) * room
     pose = replace(pose, x_mm=float(x), y_mm=float(y))
+    seen = specimen_to_px(camera, pose, line.points_mm[::40])
+    if np.any(seen < 25.0) or np.any(seen > np.array(camera.image_size_px) - 25.0):
+        return None
     clamp = Block(
         pose=pose, width_mm=rng.uniform(8.0, 14.0), height_mm=rng.uniform(3.0, 6.0),
         colour=(GREY, BLUE, BLACK)[rng.integers(3)], length_mm=90.0,

@@ -115,7 +115,7 @@ def _tip_goes_on(view: View, refined: Refined) -> bool:
     beside = 0.5 * width + 4.0
     across = np.array([-beside, -0.25 * width, 0.0, 0.25 * width, beside])
     curve = refined.fit.curve
-    s = np.linspace(1.0, 3.0, 9) * width
+    s = np.linspace(max(0.4 * width, 4.0), 1.2 * width + 4.0, 9)
     beyond = lanes(view.grey, curve, curve.s[-1] + s, across, view.sign)
     before = lanes(view.grey, curve, curve.s[-1] - s, across, view.sign)
     contrast = median(before[::4].ravel()) - median(before[1:4].ravel())

@@ -31,6 +31,10 @@ _AS_CLEAR = 0.6
 _DARK = 0.25
 """Light of a rod, over the paper's, that no mix of colours tells much better."""
 
+_SHADE, _BESIDE = 0.65, 8.0
+"""Contrast of a shade over that of its rod, at most; and how far it may lie from the
+rod, in widths."""
+
 _SHOWN = 6
 """Things that are drawn on the overlay of a refusal."""
 
@@ -111,8 +115,19 @@ def search_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
         things = [thing for thing in things if sought.fits(thing.best)] or things
     if not things:
         raise LostError("no_rod", "nothing in the picture is long and thin like a rod")
-    first, seen = things[0], [thing.best.points_px for thing in things[:_SHOWN]]
-    rivals = [other for other in things[1:] if _rivals(first, other)]
+    seen = [thing.best.points_px for thing in things[:_SHOWN]]
+    first = next(
+        thing
+        for thing in things
+        if not any(_is_shade(thing.best, other.best) for other in things)
+    )
+    rivals = [
+        other
+        for other in things
+        if other is not first
+        and _rivals(first, other)
+        and not _is_shade(other.best, first.best)
+    ]
     rod = first.best
     if rivals:
         raise _too_many([rod, *(other.best for other in rivals)], seen)
@@ -132,6 +147,15 @@ def search_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
             seen,
         )
     return rod, view
+
+
+def _is_shade(one: Candidate, rod: Candidate) -> bool:
+    """Whether a thing lies along another, paler than it: its shade on the paper."""
+    if (1.0 - one.ratio) > _SHADE * (1.0 - rod.ratio):
+        return False
+    alike = 0.4 < one.length_px / rod.length_px < 2.0
+    away = [rod.away(point) for point in one.points_px[:: len(one.points_px) // 8 + 1]]
+    return alike and max(away) < _BESIDE * rod.width_px
 
 
 def _too_many(rods: list[Candidate], seen: list[Array]) -> LostError:
@@ -237,7 +261,9 @@ def _refuse_second(first: Candidate, rods: list[Candidate]) -> None:
 
 def _accept(rod: Candidate) -> Candidate:
     if rod.contacts > 1:
-        flag = "touches_border" if rod.root == "border" else "touches_object"
-        what = "the border of the picture" if rod.root == "border" else "another object"
-        raise LostError(flag, f"the rod touches {what} besides its root")
+        if rod.leaves:
+            raise LostError("touches_border", "the rod leaves the picture")
+        raise LostError(
+            "touches_object", "the rod touches another object besides its root"
+        )
     return rod

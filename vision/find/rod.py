@@ -57,6 +57,8 @@ class Candidate:
         What it grows from.
     contacts : int
         Separate places where it touches something fat or the border.
+    leaves : bool
+        Whether one of them, besides its root, is the border of the picture.
     ratio : float
         Light on it relative to the background.
     """
@@ -67,6 +69,7 @@ class Candidate:
     root: Root
     contacts: int
     ratio: float
+    leaves: bool = False
 
     @property
     def slenderness(self) -> float:
@@ -329,6 +332,7 @@ def _trace(
         length_px=length * f,
         root=root,
         contacts=contacts + border_contacts,
+        leaves=border_contacts > (root == "border"),
         ratio=median(binary.ratio[y, x]),
     )
 

@@ -8,9 +8,10 @@ laid to those of other levels that it covers; what is seen at many levels is a t
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .binarise import Binary, rebinarise
 from .rod import Candidate, find_candidates
@@ -84,8 +85,48 @@ def find_things(
                 things.append(Thing([item]))
             else:
                 held.seen.append(item)
-    stable = [thing for thing in things if len(thing.seen) >= LEAST_LEVELS]
+    stable = _joined([thing for thing in things if len(thing.seen) >= LEAST_LEVELS])
     return sorted(stable, key=lambda thing: -thing.worth)
+
+
+def _joined(things: list[Thing]) -> list[Thing]:
+    """Lay what floats free at strict levels to its outer part that a clamp holds.
+
+    Where deep shade joins rod and clamp, at the levels that show the clamp only the
+    part outside the shade is thin.
+    """
+    left = list(things)
+    for free in things:
+        whole = free.best
+        if whole.root != "free":
+            continue
+        for thing in things:
+            part = thing.best
+            if part.root != "clamp" or not _is_outer_part(part, whole):
+                continue
+            held = [_held(item, part.points_px[-1]) for item in free.seen]
+            thing.seen[:0] = held
+            left.remove(free)
+            break
+    return left
+
+
+def _is_outer_part(part: Candidate, whole: Candidate) -> bool:
+    near = 1.5 * max(part.width_px, whole.width_px)
+    middle, tip = part.points_px[len(part.points_px) // 2], part.points_px[-1]
+    return (
+        part.length_px < whole.length_px
+        and whole.away(tip) < near
+        and whole.away(middle) < 0.5 * near
+        and _within(part.width_px, whole.width_px, 1.0 / _ALIKE_WIDTH)
+    )
+
+
+def _held(item: Candidate, tip: NDArray[np.float64]) -> Candidate:
+    """Return a free thing as held at its other end than that next to a tip."""
+    first, last = (np.hypot(*(item.points_px[k] - tip)) for k in (0, -1))
+    points = item.points_px[::-1] if first < last else item.points_px
+    return replace(item, points_px=points, root="clamp", contacts=1)
 
 
 def _rank(item: Candidate) -> float:
