@@ -35,14 +35,15 @@ def print_json(data: Any, *, indent: int | None = 2) -> None:
 
 
 @contextlib.contextmanager
-def progress(what: str, *, kept: str = "") -> Iterator[Progress]:
+def progress(what: str, *, kept: str = "", plain: bool = False) -> Iterator[Progress]:
     """Yield a callback that shows a bar with time left, or plain lines where no tty is.
 
     The bar goes to standard error, so that standard output stays for results. `kept` is
-    what `main` says after Ctrl-C is left of the work.
+    what `main` says after Ctrl-C is left of the work. `plain` asks for lines also on a
+    terminal: a bar that is drawn again and again wipes out what somebody types.
     """
     try:
-        if sys.stderr.isatty():
+        if sys.stderr.isatty() and not plain:
             with _bar(what) as callback:
                 yield callback
         else:

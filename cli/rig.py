@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from . import rig_ask, rig_flux, rig_gap, rig_run, rig_stage
+from . import rig_ask, rig_export, rig_flux, rig_gap, rig_run, rig_snapshot, rig_stage
 from .console import group
 
 app = group(
@@ -15,3 +15,5 @@ rig_gap.register(app)
 rig_ask.register(app)
 rig_run.register(app)
 rig_flux.register(app)
+rig_export.register(app)
+rig_snapshot.register(app)

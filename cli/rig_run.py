@@ -216,6 +216,11 @@ def _report(line: str) -> None:
     sys.stderr.write(line.lstrip("\a") + "\n")
 
 
+def _report_twin(line: str) -> None:
+    bell = "\a" if line.startswith("\a") else ""
+    _report(f"{bell}twin: {line.lstrip(bell)}")
+
+
 def _run_folder(plan: Plan, out: Path | None, resume: bool) -> Path:
     """Return where the run goes; refuse to touch one that is there."""
     from ..rig.runs.read import is_run
@@ -310,10 +315,12 @@ def _carry_out(
             plan, folder, readings_mT, twin_seed, control=control, speed=speed
         ) as devices,
         pausing(control, keys=keys),
-        _watching(devices, live_port, control) as report,
-        progress(plan.model.name) as tell,
+        _watching(devices, live_port, control, twin_seed is not None) as report,
+        progress(plan.model.name, plain=not keys) as tell,
     ):
         _assume(devices, assume_gap_mm)
+        if twin_seed is not None:
+            report("this is the computed bench: no device is opened")
         for note in devices.notes:
             report(f"note: {note}")
         return carry_out(
@@ -324,11 +331,15 @@ def _carry_out(
 
 @contextlib.contextmanager
 def _watching(
-    devices: Devices, port: int | None, control: RunControl
+    devices: Devices, port: int | None, control: RunControl, is_twin: bool
 ) -> Iterator[Callable[[str], None]]:
-    """Yield where the run reports to; with a port, a page in the browser too."""
+    """Yield where the run reports to; with a port, a page in the browser too.
+
+    Every line of the computed bench says that it is one.
+    """
+    say = _report_twin if is_twin else _report
     if port is None:
-        yield _report
+        yield say
         return
     from ..rig.camera.live_view import LiveStatus, Watched, live_view
 
@@ -337,8 +348,8 @@ def _watching(
     status = LiveStatus()
 
     def report(line: str) -> None:
-        status.report(line)
-        _report(line)
+        status.report(f"twin: {line}" if is_twin else line)
+        say(line)
 
     now_s = devices.clock.monotonic_s
     with live_view(devices.camera, status, now_s, port=port) as address:

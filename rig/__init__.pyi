@@ -105,6 +105,12 @@ from .ports import (
     resolve_port as resolve_port,
 )
 from .runs.control import RunControl as RunControl
+from .runs.documents import (
+    documents_of as documents_of,
+)
+from .runs.documents import (
+    write_documents as write_documents,
+)
 from .runs.dry_run import (
     homing_s as homing_s,
 )
@@ -112,6 +118,9 @@ from .runs.dry_run import (
     plan_steps as plan_steps,
 )
 from .runs.migrate import migrate_run as migrate_run
+from .runs.nexus import (
+    write_nexus as write_nexus,
+)
 from .runs.read import (
     Run as Run,
 )

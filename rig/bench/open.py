@@ -20,6 +20,10 @@ from ..wire_log import WireLog
 from .config import Plan, RigModel
 from .devices import Devices
 
+_CAMERA_SETTINGS = (
+    "exposure", "gain", "white_balance_K", "focus", "width_px", "height_px",
+)  # fmt: skip
+
 
 def open_camera(config: CameraConfig, folder: Path, clock: Clock) -> Camera:
     """Open the camera of a rig file.
@@ -80,7 +84,7 @@ def open_camera(config: CameraConfig, folder: Path, clock: Clock) -> Camera:
 
 
 def _refuse_settings(config: CameraConfig, backend: str) -> None:
-    for name in ("exposure", "gain", "white_balance_K", "width_px", "height_px"):
+    for name in _CAMERA_SETTINGS:
         if getattr(config, name) is not None:
             raise ConfigError(
                 f"camera.{name} cannot be set through the backend {backend}: it only "

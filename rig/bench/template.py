@@ -42,6 +42,7 @@ max_gap_mm = 149.0
 source = 0                 # device number, http://... stream, folder or video file
 # exposure = 100.0         # locked, read back, and proved by the brightness
 # gain = 0.0
+# focus = 30.0             # locked with autofocus off; magbend rig snapshot shows it
 frame_timeout_s = 5.0
 
 [meter]

@@ -254,9 +254,11 @@ class CaptureCamera:
             return self._state.is_closing
 
     def _set_trouble(self, sentence: str) -> None:
-        logger.warning("camera %s: %s", self._name, sentence)
         with self._changed:
+            is_new = sentence != self._state.trouble
             self._state.trouble = sentence
+        if is_new:  # a camera that stays away is tried again and again
+            logger.warning("camera %s: %s", self._name, sentence)
 
 
 class TornPictureTest:

@@ -33,6 +33,7 @@ class CameraConfig(FileModel):
     exposure: float | None = None
     gain: float | None = None
     white_balance_K: PositiveFloat | None = None
+    focus: float | None = None
     frame_timeout_s: PositiveFloat = 5.0
     latency_s: NonNegativeFloat = 0.2
     warmup_s: NonNegativeFloat = 1.0

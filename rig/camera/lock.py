@@ -24,6 +24,8 @@ PROPERTIES = {
     "gain": cv2.CAP_PROP_GAIN,
     "auto_white_balance": cv2.CAP_PROP_AUTO_WB,
     "white_balance_K": cv2.CAP_PROP_WB_TEMPERATURE,
+    "auto_focus": cv2.CAP_PROP_AUTOFOCUS,
+    "focus": cv2.CAP_PROP_FOCUS,
 }
 """In the order in which they are set: the manual mode before its value."""
 
@@ -85,5 +87,7 @@ def _asked(name: str, config: CameraConfig) -> float | None:
         return None if config.exposure is None else MANUAL
     if name == "auto_white_balance":
         return None if config.white_balance_K is None else 0.0
+    if name == "auto_focus":
+        return None if config.focus is None else 0.0
     value = getattr(config, name)
     return None if value is None else float(value)

@@ -145,6 +145,18 @@ def brightness(image: Image) -> float:
     return float(np.percentile(image, 90)) / full
 
 
+def sharpness(image: Image) -> float:
+    """Return the root mean square step between neighbours, in parts of full scale.
+
+    It peaks where the picture is in focus; compare pictures of one scene only.
+    """
+    full = 1.0 if image.dtype.kind == "f" else float(np.iinfo(image.dtype).max)
+    grey = image.astype(np.float32) if image.ndim == 2 else image.mean(2, np.float32)
+    across = np.mean(np.square(np.diff(grey, axis=1)))
+    down = np.mean(np.square(np.diff(grey, axis=0)))
+    return float(np.sqrt(across + down)) / full
+
+
 def encode_png(image: Image) -> bytes:
     """Return the picture as PNG, pixel for pixel.
 
