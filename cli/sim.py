@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from . import sim_equilibria, sim_magnet, sim_navigate, sim_sweep
+from . import sim_equilibria, sim_magnet, sim_navigate, sim_path, sim_sweep
 from .console import group, print_json
+from .sim_case import field_of, rod_of
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
@@ -22,6 +23,7 @@ app = group(
 app.command("equilibria", epilog=sim_equilibria.EXAMPLE)(sim_equilibria.equilibria)
 app.command("magnet", epilog=sim_magnet.EXAMPLE)(sim_magnet.magnet)
 app.command("navigate", epilog=sim_navigate.EXAMPLE)(sim_navigate.navigate)
+app.command("path", epilog=sim_path.EXAMPLE)(sim_path.path)
 app.command("sweep", epilog=sim_sweep.EXAMPLE)(sim_sweep.sweep)
 
 SHAPE_EXAMPLE = (
@@ -111,18 +113,7 @@ def shape(
 def _specimen(
     gmc: int | None, file: Path | None, remeasured: bool, density_kg_m3: float | None
 ) -> Specimen:
-    if (gmc is None) == (file is None):
-        raise typer.BadParameter("give either --gmc 1..7 or --specimen FILE")
-    if gmc is not None:
-        from ..sim.table1 import gmc as table1
-
-        rod = table1(gmc, remeasured=remeasured)
-    elif remeasured:
-        raise typer.BadParameter("--remeasured belongs to --gmc")
-    else:
-        from ..core.specimen_file import read_specimen
-
-        rod = read_specimen(Path(str(file)))
+    rod = rod_of(gmc, file, remeasured)
     if density_kg_m3 is not None:
         from dataclasses import replace
 
@@ -131,29 +122,12 @@ def _specimen(
 
 
 def _field(
-    field_mT: float | None, angle_deg: float, file: Path | None, gap_mm: float | None
+    flux_mT: float | None, angle_deg: float, file: Path | None, gap_mm: float | None
 ) -> Field:
-    from ..core.slips import refuse_slip
-    from ..sim.fields import UniformField
-
-    refuse_slip("flux_mT", field_mT)
-    refuse_slip("gap_mm", gap_mm)
-    if (field_mT is None) == (file is None):
-        raise typer.BadParameter("give either --field-mT B or --magnet FILE")
-    if field_mT is not None:
-        if gap_mm is not None:
-            raise typer.BadParameter("--gap-mm belongs to --magnet")
-        return UniformField(flux_mT=field_mT, angle_deg=angle_deg)
-    from ..sim.sources import read_field
-
-    field = read_field(Path(str(file)))
-    if field.follows_gap and gap_mm is None:
+    field = field_of(file, gap_mm, flux_mT, angle_deg)
+    if field.follows_gap:
         raise typer.BadParameter("--magnet needs --gap-mm D")
-    if gap_mm is None:
-        return field
-    if not field.follows_gap:
-        raise typer.BadParameter("--gap-mm: all sources of the file have their place")
-    return field.at_gap(gap_mm)
+    return field
 
 
 def _summary(rod: Specimen, model: str, solution: Solution) -> dict[str, Any]:

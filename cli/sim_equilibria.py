@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import print_json
+from .sim_case import rod_of
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
@@ -52,7 +53,7 @@ def equilibria(
     from ..sim.equilibria.folds import trace_branches
     from ..sim.fields import Support, UniformField
 
-    rod = _specimen(gmc, specimen, remeasured)
+    rod = rod_of(gmc, specimen, remeasured)
     field = UniformField(flux_mT=field_mT, angle_deg=angle_deg)
     support = Support(clamp_angle_deg=clamp_angle_deg, load_factor=load_factor)
     if figure is not None:
@@ -78,20 +79,6 @@ def equilibria(
         _print_folds(folds, field_mT)
     if figure is not None:
         typer.echo(f"wrote {figure}")
-
-
-def _specimen(gmc: int | None, file: Path | None, remeasured: bool) -> Specimen:
-    if (gmc is None) == (file is None):
-        raise typer.BadParameter("give either --gmc 1..7 or --specimen FILE")
-    if gmc is not None:
-        from ..sim.table1 import gmc as table1
-
-        return table1(gmc, remeasured=remeasured)
-    if remeasured:
-        raise typer.BadParameter("--remeasured belongs to --gmc")
-    from ..core.specimen_file import read_specimen
-
-    return read_specimen(Path(str(file)))
 
 
 def _data(

@@ -73,6 +73,18 @@ from .magnet.readings import (
 from .one_rod import (
     solve as solve,
 )
+from .path.follow import (
+    Path as Path,
+)
+from .path.follow import (
+    PathFold as PathFold,
+)
+from .path.follow import (
+    PathPoint as PathPoint,
+)
+from .path.follow import (
+    follow_path as follow_path,
+)
 from .probe import (
     flux_mT as flux_mT,
 )

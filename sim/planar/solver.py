@@ -202,7 +202,7 @@ def _solve_row(  # type: ignore[no-untyped-def]
         found[0] = FOLLOW if cold and not simple else FAILED
         return
     found[0] = OK_STABLE if index == 0 else OK_UNSTABLE
-    if not _place(u, X, out):
+    if not place(u, X, out):
         found[0] = FAILED
     elif near and touches_in_plane(field, margin, s, out):
         found[0] = GONE
@@ -215,7 +215,7 @@ def _solve_row(  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
-def _place(u, X, out):  # type: ignore[no-untyped-def]
+def place(u, X, out):  # type: ignore[no-untyped-def]
     """Turn the curve, which counts from the tip, so that it counts from the clamp.
 
     Return whether it is finite.

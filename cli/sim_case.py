@@ -1,0 +1,61 @@
+"""The rod and the field that the options of ``magbend sim`` name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+if TYPE_CHECKING:
+    from ..core.specimen import Specimen
+    from ..sim.fields import Field
+
+
+def rod_of(gmc: int | None, file: Path | None, remeasured: bool = False) -> Specimen:
+    """Return a rod of Table 1 or of a specimen file.
+
+    Raises
+    ------
+    BadParameter
+        If not exactly one is named.
+    """
+    if (gmc is None) == (file is None):
+        raise typer.BadParameter("give either --gmc 1..7 or --specimen FILE")
+    if gmc is not None:
+        from ..sim.table1 import gmc as table1
+
+        return table1(gmc, remeasured=remeasured)
+    if remeasured:
+        raise typer.BadParameter("--remeasured belongs to --gmc")
+    from ..core.specimen_file import read_specimen
+
+    return read_specimen(Path(str(file)))
+
+
+def field_of(
+    file: Path | None, gap_mm: float | None, flux_mT: float | None, angle_deg: float
+) -> Field:
+    """Return a uniform field or that of a magnet or source file.
+
+    Raises
+    ------
+    BadParameter
+        If not exactly one is named, or a gap does not belong to it.
+    """
+    if (flux_mT is None) == (file is None):
+        raise typer.BadParameter("give either --field-mT B or --magnet FILE")
+    if flux_mT is not None:
+        if gap_mm is not None:
+            raise typer.BadParameter("--gap-mm belongs to --magnet")
+        from ..sim.fields import UniformField
+
+        return UniformField(flux_mT=flux_mT, angle_deg=angle_deg)
+    from ..sim.sources import read_field
+
+    field = read_field(Path(str(file)))
+    if gap_mm is None:
+        return field
+    if not field.follows_gap:
+        raise typer.BadParameter("--gap-mm: all sources of the file have their place")
+    return field.at_gap(gap_mm)

@@ -1,0 +1,188 @@
+"""``magbend sim path``: a rod while a gap, a pose, an angle or a flux returns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from .console import print_json
+from .sim_case import field_of, rod_of
+
+if TYPE_CHECKING:
+    from ..sim.path.follow import Path as Followed
+
+EXAMPLE = (
+    "Example: magbend sim path --specimen S.toml --magnet M.toml --gap-mm 120:30:120"
+)
+_HOW = "from:to[:back...]"
+
+
+def path(
+    gmc: Annotated[
+        int | None, typer.Option(help="Rod of the paper's Table 1, 1 to 7.")
+    ] = None,
+    specimen: Annotated[Path | None, typer.Option(help="Specimen file (TOML).")] = None,
+    magnet: Annotated[
+        Path | None, typer.Option(help="Magnet or source file (TOML).")
+    ] = None,
+    field_mT: Annotated[
+        str | None, typer.Option("--field-mT", help=f"Uniform flux, or {_HOW}.")
+    ] = None,
+    angle_deg: Annotated[
+        str, typer.Option(help=f"Direction of the uniform field, or {_HOW}.")
+    ] = "90",
+    gap_mm: Annotated[
+        str | None, typer.Option(help=f"Gap of the magnet, or {_HOW}.")
+    ] = None,
+    axis_angle_deg: Annotated[
+        str | None, typer.Option(help=f"Direction of the sources' axis: {_HOW}.")
+    ] = None,
+    offset_x_mm: Annotated[
+        str | None, typer.Option(help=f"Shift of the sources along x: {_HOW}.")
+    ] = None,
+    offset_y_mm: Annotated[
+        str | None, typer.Option(help=f"Shift of the sources along y: {_HOW}.")
+    ] = None,
+    clamp_angle_deg: Annotated[
+        str | None, typer.Option(help=f"Direction of the clamp: {_HOW}.")
+    ] = None,
+    insertion_mm: Annotated[
+        str | None, typer.Option(help=f"Length of the root's section: {_HOW}.")
+    ] = None,
+    gravity_m_s2: Annotated[
+        tuple[float, float, float],
+        typer.Option(help="Free fall (x y z) in m/s2, within the plane."),
+    ] = (0.0, 0.0, 0.0),
+    steps: Annotated[int, typer.Option(min=1, help="Points on each leg.")] = 60,
+    out: Annotated[Path | None, typer.Option(help="Write the points as CSV.")] = None,
+    figure: Annotated[
+        Path | None, typer.Option(help="Draw the path: .svg, .pdf, .png.")
+    ] = None,
+    animation: Annotated[
+        Path | None, typer.Option(help="Draw the shapes one by one: .gif.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Follow a rod quasi-statically through folds, snaps and back."""
+    from ..core.files import output_file
+    from ..sim import Support
+    from ..sim.path.follow import follow_path
+
+    given = {
+        "gap_mm": gap_mm, "flux_mT": field_mT, "angle_deg": angle_deg,
+        "axis_angle_deg": axis_angle_deg, "offset_x_mm": offset_x_mm,
+        "offset_y_mm": offset_y_mm, "clamp_angle_deg": clamp_angle_deg,
+        "insertion_mm": insertion_mm,
+    }  # fmt: skip
+    legs = {name: text for name, text in given.items() if text and ":" in text}
+    if len(legs) != 1:
+        raise typer.BadParameter(f"give one option {_HOW}, such as --gap-mm 120:30:120")
+    quantity, text = next(iter(legs.items()))
+    fixed = {name: text for name, text in given.items() if name not in legs and text}
+    rod = rod_of(gmc, specimen)
+    field = field_of(
+        magnet,
+        None if quantity == "gap_mm" else _number("--gap-mm", fixed.get("gap_mm")),
+        1.0 if quantity == "flux_mT" else _number("--field-mT", fixed.get("flux_mT")),
+        90.0 if quantity == "angle_deg" else _number("--angle-deg", angle_deg) or 0.0,
+    )
+    for file in (out, figure, animation):
+        if file is not None:
+            output_file(file)
+    waypoints = [_number(f"--{quantity}", part) or 0.0 for part in text.split(":")]
+    support = Support(gravity_m_s2=gravity_m_s2)
+    found = follow_path(
+        rod, field, support=support, steps=steps, **{quantity: waypoints}
+    )  # fmt: skip
+    _write(found, rod.name, out, figure, animation)
+    if as_json:
+        print_json(_data(rod.name, found))
+    else:
+        _print(rod.name, found, [out, figure, animation])
+
+
+def _number(option: str, text: str | None) -> float | None:
+    if text is None:
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        raise typer.BadParameter(
+            f"{option.replace('_', '-')} must be numbers, as 120:30:120 is; instead "
+            f"received {text!r}"
+        ) from None
+
+
+def _write(
+    found: Followed,
+    name: str,
+    out: Path | None,
+    figure: Path | None,
+    animation: Path | None,
+) -> None:
+    if out is not None:
+        from ..core.files import write_text
+        from ..sim.path.draw import path_csv
+
+        write_text(out, path_csv(found))
+    if figure is not None:
+        from ..sim.path.draw import draw_path
+
+        draw_path(figure, found, title=name)
+    if animation is not None:
+        from ..sim.path.draw import animate_path
+
+        animate_path(animation, found, title=name)
+
+
+def _data(name: str, found: Followed) -> dict[str, Any]:
+    quantity = found.quantity
+    return {
+        "specimen": name,
+        "quantity": quantity,
+        "points": [
+            {
+                quantity: one.value,
+                "tip_mm": one.centreline.tip_mm if one.centreline else None,
+                "status": one.status,
+                "morse_index": one.morse_index,
+                "energy_uJ": one.energy_uJ,
+                "snapped": one.snapped,
+            }
+            for one in found.points
+        ],
+        "folds": [
+            {
+                quantity: one.value,
+                "direction": one.direction,
+                "kind": one.kind,
+                "tip_mm": one.tip_mm,
+                "turning": one.turning,
+            }
+            for one in found.folds
+        ],
+        "dissipated_uJ": found.dissipated_uJ,
+    }
+
+
+def _print(name: str, found: Followed, files: list[Path | None]) -> None:
+    quantity, unit = found.quantity.rsplit("_", 1)
+    typer.echo(f"{name}: {len(found.points)} points of {found.quantity}")
+    for one in found.folds:
+        x, y = one.tip_mm
+        typer.echo(
+            f"  {one.kind:8} at {one.value:.6g} {unit}, {quantity} {one.direction}, "
+            f"tip ({x:.4f}, {y:.4f}) mm"
+        )
+    if not found.folds:
+        typer.echo("  no fold: the rod goes back the way it came")
+    lost = sum(one.centreline is None for one in found.points)
+    if lost:
+        typer.echo(f"  pulled in at {lost} points")
+    if found.dissipated_uJ > 0.0:
+        typer.echo(f"  snaps dissipate {found.dissipated_uJ:.4g} microjoules")
+    for file in files:
+        if file is not None:
+            typer.echo(f"wrote {file}")

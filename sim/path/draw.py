@@ -1,0 +1,130 @@
+"""Tables, figures and animations of paths."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path as File
+
+import numpy as np
+
+from ...core.checks import shown
+from ...core.errors import InputError
+from ..study.figures import save
+from .follow import Path
+
+COLUMNS = (
+    "status", "morse_index", "tip_x_mm", "tip_y_mm", "tip_angle_deg", "energy_uJ",
+    "snapped",
+)  # fmt: skip
+
+
+def path_csv(path: Path) -> str:
+    """Return a path as CSV: a row a point, empty where there is no shape."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow([path.quantity, *COLUMNS])
+    for one in path.points:
+        row: list[object] = [f"{one.value:.15g}", one.status, one.morse_index]
+        if one.centreline is None:
+            row += ["", "", "", ""]
+        else:
+            x, y = one.centreline.tip_mm
+            numbers = (x, y, one.centreline.tip_angle_deg, one.energy_uJ)
+            row += [f"{number:.15g}" for number in numbers]
+        writer.writerow([*row, int(one.snapped)])
+    return buffer.getvalue()
+
+
+def draw_path(file: File, path: Path, *, title: str) -> None:
+    """Draw the shapes along the path, and the tip over what changes.
+
+    Raises
+    ------
+    InputError
+        If the suffix is none of .svg, .pdf and .png.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8.4, 4.0), layout="constrained")
+    shapes, tips = figure.subplots(1, 2)
+    every = max(1, len(path.points) // 24)
+    for k, one in enumerate(path.points):
+        if one.centreline is not None and k % every == 0:
+            shade = (0.15, 0.3 + 0.5 * k / len(path.points), 0.6)
+            line = one.centreline
+            shapes.plot(line.x_mm, line.y_mm, color=shade, linewidth=1.0)
+    values = [one.value for one in path.points]
+    y = [one.centreline.tip_mm[1] if one.centreline else np.nan for one in path.points]
+    turn = int(np.argmax(np.abs(np.array(values) - values[0])))
+    there, back = slice(0, turn + 1), slice(turn, None)
+    tips.plot(values[there], y[there], "-", color="C0", label="there")
+    tips.plot(values[back], y[back], "--", color="C1", label="back")
+    for fold in path.folds:
+        tips.plot(fold.value, fold.tip_mm[1], "ko", markersize=4)
+        tips.annotate(
+            f" {fold.kind}, {fold.direction}", (fold.value, fold.tip_mm[1]), fontsize=7
+        )
+    shapes.set_aspect("equal", adjustable="datalim")
+    shapes.set_xlabel("x in mm")
+    shapes.set_ylabel("y in mm")
+    name, unit = path.quantity.rsplit("_", 1)
+    tips.set_xlabel(f"{name} in {unit}")
+    tips.set_ylabel("tip y in mm")
+    tips.legend(fontsize=8, frameon=False)
+    for axes in (shapes, tips):
+        axes.grid(visible=True, linewidth=0.3)
+    figure.suptitle(
+        f"{title}: dots are where the followed equilibrium ends", fontsize=9
+    )
+    save(figure, file)
+
+
+def animate_path(file: File, path: Path, *, title: str) -> None:
+    """Draw the shapes one after the other as an animated GIF.
+
+    Raises
+    ------
+    InputError
+        If the suffix is not .gif, or no point has a shape.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from PIL import Image
+
+    from ...core.files import write_bytes
+
+    lines = [one.centreline for one in path.points if one.centreline is not None]
+    if file.suffix.lower() != ".gif" or not lines:
+        raise InputError(
+            "an animation must be a .gif file of a path that has shapes; instead "
+            f"received {shown(str(file))} and {len(lines)} shapes"
+        )
+    low = np.min([[line.x_mm.min(), line.y_mm.min()] for line in lines], axis=0) - 2.0
+    high = np.max([[line.x_mm.max(), line.y_mm.max()] for line in lines], axis=0) + 2.0
+    name, unit = path.quantity.rsplit("_", 1)
+    frames = []
+    figure = Figure(figsize=(4.8, 4.0), dpi=90, layout="constrained")
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.subplots()
+    for one in path.points:
+        axes.clear()
+        if one.centreline is not None:
+            colour = "C0" if one.status == "stable" else "C3"
+            line = one.centreline
+            axes.plot(line.x_mm, line.y_mm, color=colour, linewidth=2.5)
+        axes.set_xlim(low[0], high[0])
+        axes.set_ylim(low[1], high[1])
+        axes.set_aspect("equal")
+        axes.set_xlabel("x in mm")
+        axes.set_ylabel("y in mm")
+        axes.set_title(
+            f"{title}: {name} {one.value:.4g} {unit}, {one.status}", fontsize=8
+        )
+        canvas.draw()
+        frames.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("P"))
+    buffer = io.BytesIO()
+    frames[0].save(
+        buffer, "GIF", save_all=True, append_images=frames[1:], duration=80, loop=0
+    )
+    write_bytes(file, buffer.getvalue())

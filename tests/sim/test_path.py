@@ -1,0 +1,198 @@
+"""Paths: folds where theory has them, snaps, hysteresis, and the way back."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from magbend.cli import sim as cli
+from magbend.core.errors import InputError
+from magbend.core.units import MU0
+from magbend.sim import (
+    Cuboid,
+    Rod,
+    Section,
+    Support,
+    Uniform,
+    UniformField,
+    follow_path,
+    gmc,
+    solve,
+)
+from magbend.sim.path.draw import animate_path, draw_path, path_csv
+
+BAR = Rod(
+    name="bar", side_mm=1.0, remanence_mT=20.0,
+    sections=(Section(length_mm=30.0, E_MPa=5.0),),
+)  # fmt: skip
+CUBE = Cuboid(sides_mm=55.0, remanence_T=1.305)
+
+
+def flux_mT_of(beta: float) -> float:
+    """Return the flux density at which m B L^2 / EI is beta for the bar."""
+    EI_Nm2 = 5e6 * 1e-12 / 12.0
+    return beta * EI_Nm2 * MU0 / (20e-3 * 1e-6 * 30e-3**2) * 1e3
+
+
+# Loads at which the mirrored equilibrium of a uniform rod begins (elliptic integrals).
+FOLDS = {150.0: 4.84858825461145, 120.0: 7.16202930751652}
+
+
+@pytest.mark.parametrize("angle_deg", FOLDS)
+def test_a_turning_field_snaps_the_rod_at_the_fold_of_theory(angle_deg: float) -> None:
+    field = UniformField(flux_mT=flux_mT_of(FOLDS[angle_deg]), angle_deg=100.0)
+    mirrored = 360.0 - angle_deg
+    path = follow_path(BAR, field, angle_deg=(100.0, 290.0, 70.0, 100.0), steps=40)
+    there, back = path.folds
+    assert there.value == pytest.approx(mirrored, abs=1e-4)
+    assert back.value == pytest.approx(angle_deg, abs=1e-4)
+    assert (there.direction, back.direction) == ("rising", "falling")
+    assert there.tip_mm[1] == pytest.approx(-back.tip_mm[1], rel=1e-4)
+    assert path.dissipated_uJ > 0.0
+    # Having come back, the rod is where it was.
+    assert path.points[-1].centreline.tip_mm == pytest.approx(
+        path.points[0].centreline.tip_mm, abs=1e-9
+    )
+    assert sum(point.snapped for point in path.points) == 2
+
+
+def test_without_fold_each_point_is_that_of_solve_there_and_back() -> None:
+    path = follow_path(gmc(2), CUBE, gap_mm=(120.0, 50.0, 120.0), steps=5)
+    assert path.folds == ()
+    assert path.dissipated_uJ == 0.0
+    for point in path.points:
+        field = Cuboid(sides_mm=55.0, remanence_T=1.305, gap_mm=point.value)
+        np.testing.assert_allclose(
+            point.centreline.tip_mm, solve(gmc(2), field).centreline.tip_mm, atol=1e-9
+        )
+
+
+def test_the_slope_of_the_energy_is_the_work_of_the_magnet() -> None:
+    """By the envelope theorem dE/dgap is that of the magnetic energy alone."""
+    path = follow_path(gmc(2), CUBE, gap_mm=(60.2, 59.8), steps=2, points=241)
+    before, middle, after = path.points
+    slope = (after.energy_uJ - before.energy_uJ) / -0.4
+    from magbend.sim import Field, flux_mT
+
+    line = middle.centreline
+    at = [
+        flux_mT(
+            Field(CUBE).at_gap(g),
+            np.column_stack([line.x_mm, line.y_mm, 0.0 * line.x_mm]),
+            length_mm=30.0,
+        )
+        for g in (60.2, 59.8)
+    ]
+    change = (at[1] - at[0]) / -0.4
+    along = (
+        np.cos(line.theta_rad) * change[:, 0] + np.sin(line.theta_rad) * change[:, 1]
+    )
+    m = gmc(2).side_mm ** 2 * gmc(2).remanence_mT
+    work = -m * np.trapezoid(along, line.s_mm) * 1e-15 / MU0 * 1e6
+    assert slope == pytest.approx(work, rel=2e-3)
+
+
+def test_a_magnet_pulls_in_and_lets_go_at_its_contact() -> None:
+    rod = Rod(
+        name="attracted", side_mm=0.8, remanence_mT=-110.0,
+        sections=(Section(length_mm=55.0, E_MPa=12.0),),
+    )  # fmt: skip
+    path = follow_path(rod, CUBE, gap_mm=(60.0, 40.0, 60.0), steps=20)
+    (fold,) = path.folds
+    assert fold.direction == "falling"
+    assert 43.0 < fold.value < 44.0
+    assert math.hypot(*fold.turning) == pytest.approx(1.0)
+    lost = [point.value for point in path.points if point.centreline is None]
+    assert max(lost) < fold.value
+    assert path.points[-1].status == "stable"
+
+
+def test_other_quantities_change_what_they_name() -> None:
+    turned = follow_path(
+        gmc(2), Cuboid(sides_mm=55.0, remanence_T=1.3, gap_mm=60.0),
+        axis_angle_deg=(90.0, 80.0), steps=2,
+    )  # fmt: skip
+    other = Cuboid(sides_mm=55.0, remanence_T=1.3, gap_mm=60.0, axis_angle_deg=80.0)
+    np.testing.assert_allclose(
+        turned.points[-1].centreline.tip_mm, solve(gmc(2), other).centreline.tip_mm
+    )
+    longer = follow_path(
+        gmc(2), UniformField(flux_mT=50.0), insertion_mm=(10.0, 15.0), steps=2
+    )
+    assert longer.points[-1].centreline.length_mm == pytest.approx(35.0)
+    held = follow_path(
+        gmc(2), UniformField(flux_mT=50.0), clamp_angle_deg=(0.0, 5.0), steps=2
+    )
+    same = solve(
+        gmc(2), UniformField(flux_mT=50.0), support=Support(clamp_angle_deg=5.0)
+    )
+    np.testing.assert_allclose(
+        held.points[-1].centreline.tip_mm, same.centreline.tip_mm
+    )
+
+
+@pytest.mark.parametrize(
+    ("task", "said"),
+    [
+        (lambda: follow_path(gmc(2), CUBE), "waypoints of one of gap_mm"),
+        (lambda: follow_path(gmc(2), CUBE, gap_mm=(60.0,)), "at least two waypoints"),
+        (lambda: follow_path(gmc(2), CUBE, gap_mm=(60.0, math.nan)), "finite"),
+        (lambda: follow_path(gmc(2), CUBE, flux_mT=(1.0, 2.0)), "flux_mT must belong"),
+        (lambda: follow_path(gmc(2), CUBE, speed=(1.0, 2.0)), "instead received speed"),
+        (
+            lambda: follow_path(gmc(2), Uniform(flux_mT=9.0), gap_mm=(9.0, 8.0)),
+            "gap_mm",
+        ),
+        (
+            lambda: follow_path(
+                gmc(2), Uniform(flux_mT=9.0, elevation_deg=5.0), flux_mT=(9.0, 8.0)
+            ),
+            "planar",
+        ),
+    ],
+)
+def test_bad_paths_are_refused_in_one_sentence(task: object, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        task()
+
+
+def test_tables_figures_and_animations(tmp_path: Path) -> None:
+    path = follow_path(gmc(2), CUBE, gap_mm=(80.0, 60.0), steps=3)
+    rows = path_csv(path).splitlines()
+    assert rows[0].startswith("gap_mm,status,")
+    assert len(rows) == 5
+    draw_path(tmp_path / "path.svg", path, title="rod")
+    assert (tmp_path / "path.svg").read_text().startswith("<?xml")
+    animate_path(tmp_path / "path.gif", path, title="rod")
+    from PIL import Image
+
+    with Image.open(tmp_path / "path.gif") as film:
+        assert film.n_frames == 4
+    with pytest.raises(InputError, match=r"[.]gif"):
+        animate_path(tmp_path / "path.mp3", path, title="rod")
+
+
+def test_the_command_says_points_and_folds(tmp_path: Path) -> None:
+    rod, magnet = tmp_path / "S.toml", tmp_path / "M.toml"
+    rod.write_text(
+        'name = "attracted"\nside_mm = 0.8\nremanence_mT = -110\n'
+        "[[section]]\nlength_mm = 55\nE_MPa = 12\n"
+    )
+    magnet.write_text("side_mm = 55.0\nremanence_T = 1.305\n")
+    options = ["path", "--specimen", str(rod), "--magnet", str(magnet)]
+    done = CliRunner().invoke(
+        cli.app, [*options, "--gap-mm", "120:30:120", "--steps", "9", "--json"]
+    )
+    found = json.loads(done.output)
+    assert [point["gap_mm"] for point in found["points"]][:2] == [120.0, 110.0]
+    assert found["points"][-1]["tip_mm"] == pytest.approx(found["points"][0]["tip_mm"])
+    assert {point["status"] for point in found["points"]} == {
+        "stable", "pulled in: no equilibrium",
+    }  # fmt: skip
+    assert found["folds"][0]["direction"] == "falling"
+    assert CliRunner().invoke(cli.app, options).exit_code == 2
