@@ -15,9 +15,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ...core.errors import CameraError, MagbendError, RigError
+from ...core.picture import decode_picture
 from ..bench.sight import Picture
 from ..workspace import Workspace
 from .process import start
@@ -145,11 +144,7 @@ class Supervisor:
         return self._decoded(data, facts)
 
     def _decoded(self, data: bytes, facts: dict[str, Any]) -> Picture:
-        import cv2
-
-        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-        if image is None:
-            raise CameraError("the run's live view sent a broken picture")
+        image = decode_picture(data, "the run's live view", CameraError)
         self._number -= 1  # below zero: never one of the panel's own camera
         still = facts.get("state") in ("settling", "measuring", "photographing")
         return Picture(

@@ -66,8 +66,9 @@ def open_camera(config: CameraConfig, folder: Path, clock: Clock) -> Camera:
         return _open_files(config, backend, folder / str(source), clock)
     make: Callable[[], Source]
     if backend == "mjpeg":
-        from ..camera.mjpeg import MjpegSource
+        from ..camera.mjpeg import MjpegSource, prepare
 
+        prepare()
         url = str(source)
         if not url.startswith(("http://", "https://")):
             raise ConfigError(

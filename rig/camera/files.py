@@ -9,7 +9,9 @@ from typing import Any
 import cv2
 import numpy as np
 
+from ...core.door import read_file
 from ...core.errors import CameraError
+from ...core.picture import decode_picture
 from ..clock import Check, Clock, go_on, utc_text, wait
 from .protocol import Frame, Image
 
@@ -48,11 +50,8 @@ def read_image(path: Path) -> Image:
     CameraError
         If it cannot be decoded.
     """
-    data = np.fromfile(path, np.uint8)
-    image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
-    if image is None:
-        raise CameraError(f"{path}: is not a picture that can be read")
-    return np.asarray(image)
+    data = read_file(path, 256.0, CameraError)
+    return np.asarray(decode_picture(data, str(path), CameraError))
 
 
 class FolderCamera:

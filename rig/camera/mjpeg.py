@@ -19,6 +19,8 @@ from urllib.parse import unquote, urlsplit
 import numpy as np
 
 from ...core.errors import CameraError
+from ...core.jpeg import is_damaged
+from ...core.picture import decode_picture
 from ..clock import Clock
 from .capture import BrokenPictureError
 from .chunked import Chunks
@@ -263,25 +265,31 @@ class MultipartParser:
         return True
 
 
+def prepare() -> None:
+    """Load what checks pictures; the first time ever that takes seconds.
+
+    A camera must not be waited for meanwhile.
+    """
+    import cv2
+
+    is_damaged(cv2.imencode(".jpg", np.zeros((16, 16, 3), np.uint8))[1].tobytes())
+
+
 def decode_jpeg(data: bytes) -> Image:
     """Return the picture of a whole JPEG, grey or blue-green-red as it was stored.
 
     Raises
     ------
     BrokenPictureError
-        If its start or end mark is missing, or it cannot be decoded.
+        If its start or end mark is missing, its coded data go astray, or it is too
+        large.
     """
-    import cv2
-
     body = data.strip(_PADDING)
     if not body.startswith(_START):
         raise BrokenPictureError("it does not begin as a JPEG")
     if not body.endswith(_END):
         raise BrokenPictureError(f"it was cut off after {len(body)} bytes")
-    image = cv2.imdecode(np.frombuffer(body, np.uint8), cv2.IMREAD_UNCHANGED)
-    if image is None:
-        raise BrokenPictureError("it cannot be decoded")
-    return image
+    return np.asarray(decode_picture(body, "it", BrokenPictureError))
 
 
 def _connect(url: str, timeout_s: float) -> socket.socket:

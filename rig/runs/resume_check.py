@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from ...core.errors import StageError
+from ...core.door import inside, read_file
+from ...core.errors import StageError, StoreError
+from ...core.picture import decode_picture
 from ..bench.config import Plan
 from ..bench.devices import Devices
 from ..camera.protocol import grab_median
@@ -78,14 +80,18 @@ def verify_position(
 
 
 def _image_change(folder: Path, last: Record, image: object) -> float | None:
-    import cv2
     import numpy as np
 
     files = last.get("files") or []
     if not files:
         return None
-    stored = cv2.imread(str(folder / files[0]["path"]), cv2.IMREAD_UNCHANGED)
+    path = inside(folder, str(files[0]["path"]), StoreError)
     now = np.asarray(image)
-    if stored is None or stored.shape != now.shape:
+    try:
+        data = read_file(path, 256.0, StoreError)
+        stored = decode_picture(data, path.name, StoreError)
+    except StoreError:
+        return None
+    if stored.shape != now.shape:
         return None
     return change_percent(stored, now)

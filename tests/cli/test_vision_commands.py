@@ -271,7 +271,8 @@ def test_a_specimen_is_known_from_its_file_or_from_the_run(
     picture = cv2.imread(str(photo))
     assert cv2.imwrite(str(run / "images" / "step_000.png"), picture)
     specimen = tomllib.loads(rod.read_text(encoding="utf-8"))
-    (run / "run.json").write_text(json.dumps({"specimen": specimen}))
+    record = {"schema": 1, "plan": {}, "specimen": specimen}
+    (run / "run.json").write_text(json.dumps(record))
     code, _, messages = magbend("vision", "extract", run, "--calibration", calibration)
     assert code == 0
     assert "length_mismatch" in messages

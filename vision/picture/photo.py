@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import VisionError
+from ...core.picture import MAX_PIXELS, PNG, check_whole
 from .header import HEIF, Header, by_profile, decode_heif, read_header
-from .whole import MAX_PIXELS, PNG, check_whole
 
 MIN_SIDE = 16
 
