@@ -68,7 +68,11 @@ def run(
     assume_gap_mm: AssumeGap = None,
     live_port: Annotated[
         int | None,
-        typer.Option(help="Show camera and state on this port of 127.0.0.1; 0: any."),
+        typer.Option(
+            min=0,
+            max=65535,
+            help="Show camera and state on this port of 127.0.0.1; 0: any.",
+        ),
     ] = None,
     twin: Twin = False,
     seed: Seed = 1,

@@ -8,6 +8,7 @@ dash as well, so that a grey print still works.
 
 from __future__ import annotations
 
+import hashlib
 import io
 import re
 from collections.abc import Sequence
@@ -89,6 +90,8 @@ _RC = {
     # A true minus lies outside the first 255 characters and would embed the font twice,
     # which is half of the time of a PDF; the page gets it back in `to_svg`.
     "axes.unicode_minus": False,
+    # Names of runs and specimens are text, whatever signs they hold.
+    "text.parse_math": False,
     "figure.facecolor": "none",
     "axes.facecolor": "none",
     "savefig.facecolor": "none",
@@ -197,14 +200,24 @@ def to_pdf(figure: Figure) -> bytes:
     return buffer.getvalue()
 
 
+def safe_name(name: str) -> str:
+    """Return a name fit for ids and files; one that had to change stays unique."""
+    plain = re.sub(r"[^A-Za-z0-9_-]+", "-", name)
+    if plain == name:
+        return name
+    return f"{plain}-{hashlib.sha256(name.encode()).hexdigest()[:8]}"
+
+
 def to_svg(figure: Figure, name: str) -> str:
     """Return the figure as SVG for the page: scalable, in the page's colours.
 
     Parameters
     ----------
     name : str
-        Goes before every id, so that figures do not share any; must be unique.
+        Goes before every id, so that figures do not share any; must be unique. Signs
+        that end an attribute of HTML are taken out.
     """
+    name = safe_name(name)
     buffer = io.StringIO()
     with drawing():
         figure.savefig(buffer, format="svg", metadata={"Date": None})

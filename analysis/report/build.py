@@ -25,6 +25,10 @@ from ..fit.result import FitResult
 from ..runs.load import Step
 from .budget import BudgetLine, tip_budget
 from .photos import photo_settings, photograph_svg
+<<<<<<< HEAD
+=======
+from .style import safe_name, to_pdf, to_svg
+>>>>>>> 367e8bf (Cut secrets from addresses, bound the live view, escape names in figures)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -61,7 +65,7 @@ class _Drawing:
         if figure is None:
             return ""
         svg = to_svg(figure, name)
-        self.pdfs[f"{name}.pdf"] = to_pdf(figure)
+        self.pdfs[f"{safe_name(name)}.pdf"] = to_pdf(figure)
         return svg
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from ...core.errors import CameraError, ConfigError, MeterError
 from ...core.plugin_options import checked_options
 from ...core.plugins import load_plugin, offered
+from ...core.urls import without_secrets
 from ..camera.capture import CaptureCamera, Source
 from ..camera.config import OWN_BACKENDS, CameraConfig
 from ..camera.protocol import Camera, NoCamera
@@ -73,7 +74,7 @@ def open_camera(config: CameraConfig, folder: Path, clock: Clock) -> Camera:
         if not url.startswith(("http://", "https://")):
             raise ConfigError(
                 f"camera.source must be an http:// or https:// address for the backend "
-                f"mjpeg; instead received {url!r}"
+                f"mjpeg; instead received {without_secrets(url)!r}"
             )
         make = lambda: MjpegSource(url, clock, timeout_s=config.frame_timeout_s)  # noqa: E731
     else:
@@ -81,7 +82,7 @@ def open_camera(config: CameraConfig, folder: Path, clock: Clock) -> Camera:
 
         device = int(source) if str(source).isdigit() else source
         make = lambda: OpenCvSource(device, config, clock)  # noqa: E731
-    return CaptureCamera(make, _without_password(str(source)), config, clock)
+    return CaptureCamera(make, without_secrets(str(source)), config, clock)
 
 
 def _refuse_settings(config: CameraConfig, backend: str) -> None:
@@ -117,13 +118,8 @@ def _backend_of(source: str | int, folder: Path) -> str:
         return "video"
     raise CameraError(
         f"camera.source must be a device number, an address, a folder or a video; "
-        f"instead received {text!r}, and {path} does not exist"
+        f"instead received {without_secrets(text)!r}, and {path} does not exist"
     )
-
-
-def _without_password(source: str) -> str:
-    scheme, separator, rest = source.partition("://")
-    return f"{scheme}{separator}{rest.rpartition('@')[2]}" if separator else source
 
 
 def open_meter(

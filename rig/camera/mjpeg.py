@@ -21,6 +21,7 @@ import numpy as np
 from ...core.errors import CameraError
 from ...core.jpeg import is_damaged
 from ...core.picture import decode_picture
+from ...core.urls import without_secrets
 from ..clock import Clock
 from .capture import BrokenPictureError
 from .chunked import Chunks
@@ -48,6 +49,7 @@ class MjpegSource:
 
     def __init__(self, url: str, clock: Clock, *, timeout_s: float) -> None:
         self._url = url
+        self._name = without_secrets(url)
         self._clock = clock
         self._timeout_s = timeout_s
         self._socket: socket.socket | None = None
@@ -74,17 +76,17 @@ class MjpegSource:
             self._socket.sendall(_request(self._url))
             header, rest = self._response_header(self._socket)
         except OSError as error:
-            raise CameraError(f"{_shown(self._url)}: {error}") from None
+            raise CameraError(f"{self._name}: {error}") from None
         status = header.split(b"\r\n", 1)[0].split()
         if len(status) < 2 or status[1] != b"200":
             line = header.split(b"\r\n", 1)[0].decode("latin-1")
-            raise CameraError(f"{_shown(self._url)}: the server answered {line!r}")
+            raise CameraError(f"{self._name}: the server answered {line!r}")
         found = re.search(rb"(?im)^content-type:\s*([^\r\n]+)", header)
         self.content_type = found.group(1).decode("latin-1").strip() if found else ""
         boundary = re.search(r'boundary="?([^";\s]+)', self.content_type)
         if "multipart" not in self.content_type or boundary is None:
             raise CameraError(
-                f"{_shown(self._url)}: must be a motion JPEG stream (multipart); "
+                f"{self._name}: must be a motion JPEG stream (multipart); "
                 f"instead its content type is {self.content_type or 'missing'!r}"
             )
         # Some servers write the dashes into the parameter, some do not.
@@ -119,7 +121,7 @@ class MjpegSource:
                 break
             self._parser.feed(self._body(chunk), self._empty_s)
         if newest is None:
-            raise CameraError(f"{_shown(self._url)}: sent nothing")
+            raise CameraError(f"{self._name}: sent nothing")
         return decode_jpeg(newest[0]), newest[1]
 
     def _body(self, data: bytes) -> bytes:
@@ -141,7 +143,7 @@ class MjpegSource:
     def _receive(self, timeout_s: float) -> bytes | None:
         """Return what is there; None if nothing is and `timeout_s` is zero."""
         if self._socket is None:
-            raise CameraError(f"{_shown(self._url)}: is not open")
+            raise CameraError(f"{self._name}: is not open")
         try:
             chunk = self._recv(0.0)
             if chunk is None and timeout_s > 0.0:
@@ -151,13 +153,11 @@ class MjpegSource:
             elif chunk is None:
                 return None
         except OSError as error:
-            raise CameraError(f"{_shown(self._url)}: {error}") from None
+            raise CameraError(f"{self._name}: {error}") from None
         if chunk is None:
-            raise CameraError(
-                f"{_shown(self._url)}: the stream stalled for {timeout_s:g} s"
-            )
+            raise CameraError(f"{self._name}: the stream stalled for {timeout_s:g} s")
         if not chunk:
-            raise CameraError(f"{_shown(self._url)}: the server closed the stream")
+            raise CameraError(f"{self._name}: the server closed the stream")
         return chunk
 
     def _recv(self, timeout_s: float) -> bytes | None:
@@ -174,7 +174,7 @@ class MjpegSource:
         while b"\r\n\r\n" not in data:
             chunk = connection.recv(_CHUNK)
             if not chunk or len(data) > _CHUNK:
-                raise CameraError(f"{_shown(self._url)}: does not speak HTTP")
+                raise CameraError(f"{self._name}: does not speak HTTP")
             data += chunk
         header, _, rest = data.partition(b"\r\n\r\n")
         return header, rest
@@ -311,10 +311,3 @@ def _request(url: str) -> bytes:
         token = base64.b64encode(user.encode("utf-8")).decode("ascii")
         lines.append(f"Authorization: Basic {token}")
     return ("\r\n".join(lines) + "\r\n\r\n").encode("latin-1")
-
-
-def _shown(url: str) -> str:
-    """Return the URL without user and password."""
-    parts = urlsplit(url)
-    host = (parts.hostname or "") + (f":{parts.port}" if parts.port else "")
-    return parts._replace(netloc=host).geturl()

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 
 from ...core.errors import CameraError
+from ...core.urls import without_secrets
 from ..clock import Clock
 from .config import CameraConfig
 from .lock import Settings, lock, not_kept, read_back
@@ -35,6 +36,7 @@ class OpenCvSource:
 
     def __init__(self, source: int | str, config: CameraConfig, clock: Clock) -> None:
         self._source = source
+        self._name = without_secrets(str(source))
         self._config = config
         self._clock = clock
         self._capture: cv2.VideoCapture | None = None
@@ -73,7 +75,7 @@ class OpenCvSource:
             self._capture = cv2.VideoCapture(self._source)
         if not self._capture.isOpened():
             raise CameraError(
-                f"camera {self._source!r} cannot be opened; magbend doctor lists the "
+                f"camera {self._name!r} cannot be opened; magbend doctor lists the "
                 f"cameras that answer"
             )
         self._settings = lock(self._capture, self._config)
@@ -99,10 +101,10 @@ class OpenCvSource:
         """
         began_s = self._clock.monotonic_s()
         if self._capture is None:
-            raise CameraError(f"camera {self._source!r} is not open")
+            raise CameraError(f"camera {self._name!r} is not open")
         is_read, image = self._capture.read()
         if not is_read or image is None:
-            raise CameraError(f"camera {self._source!r} stalled or was closed")
+            raise CameraError(f"camera {self._name!r} stalled or was closed")
         if self._is_first:  # some forget their settings when the pictures begin
             read_back(self._capture, self._settings)
             self._is_first = False

@@ -13,6 +13,7 @@ from typing import Any
 
 from ...core.errors import StoreError
 from ...core.specimen_file import specimen_dict
+from ...core.urls import without_secrets
 from ..bench.config import Plan
 from ..bench.devices import Devices
 from .records import SCHEMA, Record
@@ -41,7 +42,7 @@ def make_manifest(plan: Plan, devices: Devices, *, twin: bool) -> Record:
         "created_utc": devices.utc(),
         "plan": plan.as_dict(),
         "specimen": specimen_dict(plan.specimen),
-        "rig": plan.rig.model_dump(mode="json", exclude={"twin"}),
+        "rig": _without_secrets(plan.rig.model_dump(mode="json", exclude={"twin"})),
         "map": devices.stage.place_map.as_dict(),
         "assumed_gap": devices.stage.assumed,
         "devices": {
@@ -56,6 +57,15 @@ def make_manifest(plan: Plan, devices: Devices, *, twin: bool) -> Record:
         "twin": twin,
         "twin_faults": plan.rig.twin.model_dump(mode="json")["fault"] if twin else [],
     }
+
+
+def _without_secrets(value: Any) -> Any:
+    """Return a record whose addresses hold no password: runs are given away."""
+    if isinstance(value, dict):
+        return {key: _without_secrets(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_without_secrets(item) for item in value]
+    return without_secrets(value) if isinstance(value, str) else value
 
 
 def require_same(old: Record, new: Record) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from magbend.core.errors import CameraError
-from magbend.core.picture import check_whole, decode_picture, picture_size
+from magbend.core.picture import decode_picture, picture_size
 from magbend.rig.camera.mjpeg import BrokenPictureError, decode_jpeg
 
 PHOTO = Path(__file__).parents[2] / "fixtures/vision/rendered/dev_12.jpg"
@@ -58,7 +58,7 @@ def huge(ending: str) -> bytes:
 
 @pytest.mark.parametrize("ending", [".png", ".bmp", ".jpg"])
 def test_a_picture_that_claims_gigabytes_is_refused_before_it_is_decoded(ending):
-    with pytest.raises(CameraError, match="at most 64 megapixels|cut off or damaged"):
+    with pytest.raises(CameraError, match=r"at most 64 megapixels|cut off or damaged"):
         decode_picture(huge(ending), "x", CameraError)
 
 
@@ -79,12 +79,17 @@ def test_a_jpeg_with_bytes_cut_out_is_known_at_the_stream_too():
 
 def test_what_is_no_picture_is_a_sentence():
     generator = np.random.default_rng(7)
-    for start in (b"", b"BM", b"RIFF", b"II*\0", b"\x89PNG\r\n\x1a\n", b"\xff\xd8", b"x"):
+    for start in (
+        b"",
+        b"BM",
+        b"RIFF",
+        b"II*\0",
+        b"\x89PNG\r\n\x1a\n",
+        b"\xff\xd8",
+        b"x",
+    ):
         for _ in range(20):
             data = start + generator.bytes(int(generator.integers(0, 200)))
-            with pytest.raises(CameraError):
+            with pytest.raises(CameraError) as caught:
                 decode_picture(data, "x", CameraError)
-            try:
-                check_whole(data, "x", CameraError)
-            except CameraError as error:
-                assert "\n" not in str(error)
+            assert "\n" not in str(caught.value)

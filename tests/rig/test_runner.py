@@ -246,3 +246,18 @@ def test_camera_error_is_a_camera_error(make_bench) -> None:
     bench = make_bench(camera={"faults": {1: "stall"}})
     with pytest.raises(CameraError):
         bench.camera.grab_after(0.0)
+
+
+def test_no_password_of_a_camera_stands_in_the_record(bench, tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    camera = bench.plan.rig.camera.model_copy(
+        update={"source": "http://me:hunter2@cam/live?token=sesame"}
+    )
+    rig = bench.plan.rig.model_copy(update={"camera": camera})
+    run(replace(bench.plan, rig=rig), bench.devices, tmp_path / "out")
+    for path in (tmp_path / "out").rglob("*"):
+        if path.is_file():
+            data = path.read_bytes()
+            assert b"hunter2" not in data
+            assert b"sesame" not in data
