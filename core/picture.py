@@ -15,7 +15,7 @@ from .jpeg import is_damaged
 
 MAX_PIXELS = 64_000_000
 _MOST_PAGES = 1000
-_PNM = re.compile(rb"P[1-6](?:\s+|#[^\n]*\n)+(\d{1,9})(?:\s+|#[^\n]*\n)+(\d{1,9})\s")
+_PNM = re.compile(rb"P[1-6](?:\s|#[^\n]*\n)+(\d{1,9})(?:\s|#[^\n]*\n)+(\d{1,9})\s")
 
 PNG = b"\x89PNG\r\n\x1a\n"
 JPEG = b"\xff\xd8"
@@ -79,8 +79,8 @@ def decode_picture(data: bytes, source: str, kind: type[MagbendError]) -> Any:
     Raises
     ------
     MagbendError
-        Of the given `kind`, if it is no PNG, JPEG, BMP, TIFF, WebP or PNM, too large, cut
-        off or damaged.
+        Of the given `kind`, if it is no PNG, JPEG, BMP, TIFF, WebP or PNM, too large,
+        cut off or damaged.
     """
     import cv2
     import numpy as np

@@ -19,16 +19,12 @@ from ..compare.compare import Comparison, RunComparison, models_of
 from ..figures.fit import fit_figure
 from ..figures.run import field_figure, residual_figure, shapes_figure, step_label
 from ..figures.several import paper_figure, summary_figure
-from ..figures.style import to_pdf, to_svg
+from ..figures.style import safe_name, to_pdf, to_svg
 from ..fit.models import model_sentence
 from ..fit.result import FitResult
 from ..runs.load import Step
 from .budget import BudgetLine, tip_budget
 from .photos import photo_settings, photograph_svg
-<<<<<<< HEAD
-=======
-from .style import safe_name, to_pdf, to_svg
->>>>>>> 367e8bf (Cut secrets from addresses, bound the live view, escape names in figures)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
