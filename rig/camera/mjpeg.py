@@ -130,7 +130,7 @@ class MjpegSource:
             return data
         body = self._chunks.feed(data)
         if self._chunks.is_over and not body:
-            raise CameraError(f"{_shown(self._url)}: the server ended the stream")
+            raise CameraError(f"{self._name}: the server ended the stream")
         return body
 
     def close(self) -> None:
