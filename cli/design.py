@@ -46,6 +46,14 @@ def design(
     rod_height_mm: float = typer.Option(
         0.0, "--rod-height-mm", help="Height of the curve above the board."
     ),
+    lumen: Path | None = typer.Option(
+        None, "--lumen", help="Lumen to pass with the least force on its walls (TOML)."
+    ),
+    gate: str | None = typer.Option(None, "--gate", help="Gate of the lumen to pass."),
+    friction: float = typer.Option(0.0, "--friction", help="On the lumen's walls."),
+    tip_stiffness_N_mm: float | None = typer.Option(
+        None, "--tip-stiffness-N-mm", help="With --lumen: of every rod, at its tip."
+    ),
     flux_mT: float | None = typer.Option(None, "--field-mT", help="Uniform field, mT."),
     field_angle_deg: float = typer.Option(
         90.0, "--field-angle-deg", help="Direction of the uniform field from +x."
@@ -93,17 +101,6 @@ def design(
     from ..core.files import output_folder
     from ..core.slips import refuse_slip
 
-    if figure is not None:
-        model_figures.check_path(figure)
-    for name, value in (
-        ("flux_mT", flux_mT), ("gap_mm", gap_mm), ("remanence_mT", remanence_mT),
-    ):  # fmt: skip
-        refuse_slip(name, value)
-    goal = _goal(
-        radius_mm, tip_mm, tip_angle_deg, curve, polyline, calibration, rod_height_mm,
-        Reading(unit=unit, flip=flip, align=align),
-    )  # fmt: skip
-    field = _field(flux_mT, field_angle_deg, magnet, gap_mm)
     options: dict[str, object] = {
         "total_length_mm": _range(length_mm, "--length-mm"),
         "side_mm": _range(side_mm, "--side-mm"),
@@ -111,6 +108,37 @@ def design(
         "unit_length_mm": _range(unit_length_mm, "--unit-length-mm"),
         "remanence_mT": remanence_mT,
     }
+    for name, value in (
+        ("flux_mT", flux_mT), ("gap_mm", gap_mm), ("remanence_mT", remanence_mT),
+    ):  # fmt: skip
+        refuse_slip(name, value)
+    if lumen is not None:
+        from ..sim import UniformField
+        from .design_lumen import design_lumen
+
+        no_field = flux_mT is None and magnet is None
+        design_lumen(
+            lumen,
+            UniformField(flux_mT=0.0)
+            if no_field
+            else _field(flux_mT, field_angle_deg, magnet, gap_mm),
+            _makeable(makeable, options, recipes, recipe, None),
+            stiffness_N_mm=tip_stiffness_N_mm,
+            friction=friction,
+            gate=gate,
+            count=count,
+            seed=seed,
+            out=output_folder(out) if out is not None else None,
+            as_json=as_json,
+        )
+        return
+    if figure is not None:
+        model_figures.check_path(figure)
+    goal = _goal(
+        radius_mm, tip_mm, tip_angle_deg, curve, polyline, calibration, rod_height_mm,
+        Reading(unit=unit, flip=flip, align=align),
+    )  # fmt: skip
+    field = _field(flux_mT, field_angle_deg, magnet, gap_mm)
     limits = _makeable(makeable, options, recipes, recipe, goal)
     if out is not None:
         output_folder(out)
@@ -145,8 +173,8 @@ def _goal(
     given = [radius_mm, tip_mm, tip_angle_deg, curve, polyline]
     if sum(value is not None for value in given) != 1:
         raise InputError(
-            "give exactly one of --radius-mm, --tip, --tip-angle-deg, --curve and "
-            "--polyline"
+            "give exactly one of --radius-mm, --tip, --tip-angle-deg, --curve, "
+            "--polyline and --lumen"
         )
     if radius_mm is not None:
         return goals.radius_goal(radius_mm)
@@ -208,7 +236,7 @@ def _makeable(
     options: dict[str, object],
     recipes: bool,
     law: Path | None,
-    goal: Goal,
+    goal: Goal | None,
 ) -> Makeable:
     from pydantic import ValidationError
 
@@ -221,7 +249,7 @@ def _makeable(
     if path is not None:
         data = read_toml(path, makeable.Makeable).model_dump(exclude_unset=True)
     data |= {key: value for key, value in options.items() if value is not None}
-    length_mm = goals.curve_length_mm(goal)
+    length_mm = goals.curve_length_mm(goal) if goal is not None else None
     if length_mm is not None:
         data["total_length_mm"] = (length_mm, length_mm)
     if recipes and law is not None:

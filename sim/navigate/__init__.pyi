@@ -10,6 +10,7 @@ from .files import read_poses as read_poses
 from .lumen import Gate as Gate
 from .lumen import Lumen as Lumen
 from .lumen import Wall as Wall
+from .many import navigate_many as navigate_many
 from .passage import Contact as Contact
 from .passage import Event as Event
 from .passage import Passage as Passage
