@@ -140,6 +140,7 @@ def _between(photo: Photo, setting: Setting, points: Array) -> Measurement:
     steps = np.hypot(*np.diff(path, axis=0).T)
     length = float(steps.sum())
     lost = LostError("no_rod", "there is no rod between the points")
+    best: Measurement | None = None
     for share in _WIDTHS:
         width = max(3.0, share * length)
         rod = Candidate(
@@ -154,9 +155,16 @@ def _between(photo: Photo, setting: Setting, points: Array) -> Measurement:
             continue
         except BROKEN:
             continue
-        if _same(found, points, width):
-            return found
-    raise lost
+        if not _same(found, points, width):
+            continue
+        # A width that is far off makes smooth edges look rough.
+        if best is None or len(found.flags) < len(best.flags):
+            best = found
+        if "rough_edges" not in found.flags:
+            break
+    if best is None:
+        raise lost
+    return best
 
 
 def _same(found: Measurement, points: Array, width_px: float) -> bool:
