@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import typer
 
@@ -64,8 +65,18 @@ def query(
     unit: str = UNIT,
     flip: bool = FLIP,
     align: bool = ALIGN,
-    sort: str | None = typer.Option(
-        None, "--sort", help="Column to rank by; --sort=-COLUMN for falling."
+    sort: list[str] = typer.Option(
+        [],
+        "--sort",
+        help="Column or expression to rank by; --sort=-COLUMN for falling; repeatable.",
+    ),
+    pareto: list[str] = typer.Option(
+        [],
+        "--pareto",
+        help="Wanted small (--pareto=-COLUMN: large); repeatable: the front of all.",
+    ),
+    sql: str | None = typer.Option(
+        None, "--sql", help="One SELECT over the table designs, instead of the others."
     ),
     top: int = typer.Option(20, "--top", help="How many rows."),
     out: Path | None = typer.Option(None, "--out", help=".csv or .parquet."),
@@ -74,6 +85,8 @@ def query(
     """Search a library: conditions, nearest shape, sort, the best few."""
     from ..analysis import Reading, read_shape
     from ..analysis.library import query as searching
+    from ..analysis.library.sql import ask
+    from ..core.errors import InputError
     from ..core.files import output_file
 
     shape = None
@@ -82,9 +95,15 @@ def query(
         shape = read_shape(str(nearest), Path(), how).line
     if out is not None:
         output_file(out)
+    if sql is not None:
+        if where or ranges or sort or pareto or nearest:
+            raise InputError("--sql stands alone; give its conditions in the SELECT")
+        _show_sql(ask(library, sql, top=top), out, as_json)
+        return
     found = searching.query(
-        library, where=where, ranges=ranges, nearest=shape, sort=sort, top=top
-    )
+        library, where=where, ranges=ranges, nearest=shape, sort=sort, pareto=pareto,
+        top=top,
+    )  # fmt: skip
     if found.missing_partitions:
         typer.echo(
             f"warning: {found.missing_partitions} partitions are not built yet; "
@@ -105,6 +124,17 @@ def query(
     typer.echo(f"{found.matched} of {found.designs} designs match")
     if out is None:
         _print_table(found.table.to_pylist())
+
+
+def _show_sql(table: Any, out: Path | None, as_json: bool) -> None:
+    from ..analysis.library.query import write_table
+
+    if out is not None:
+        write_table(table, out)
+    elif as_json:
+        print_json(table.to_pylist())
+    else:
+        _print_table(table.to_pylist())
 
 
 def _print_table(rows: list[dict[str, object]]) -> None:

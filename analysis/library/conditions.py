@@ -1,18 +1,21 @@
 """Conditions typed by people, as Arrow expressions: a small, closed language.
 
 ``tip_y_mm > 4 and side_mm <= 1``, ``10 < radius_mm < 50 or status != "stable"``,
-``not flux_mT in (10, 20)``. Only columns, numbers, strings, comparisons and logic:
-nothing is evaluated as Python.
+``not flux_mT in (10, 20)``, ``E1_MPa / E3_MPa > 2``, ``abs(tip_y_mm - 5) < 0.1``,
+``length1_mm + length2_mm == 20``, ``total_length_mm == 30``. Only columns, numbers,
+strings, comparisons, logic, the four operations and abs: nothing is evaluated as
+Python. What is computed counts as equal within a millionth.
 """
 
 from __future__ import annotations
 
 import ast
 import difflib
+import functools
 import math
 import operator
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, TypeGuard
 
 from ...core.errors import InputError
 
@@ -20,6 +23,17 @@ _COMPARE = {
     ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt,
     ast.GtE: operator.ge, ast.Eq: operator.eq, ast.NotEq: operator.ne,
 }  # fmt: skip
+
+
+_OPERATIONS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+}  # fmt: skip
+TOTAL = "total_length_mm"
+"""The sum of the sections' lengths: a column that no library holds."""
+
+NEAR = 1e-6
+"""Within which computed numbers are equal."""
 
 
 def parse_where(text: str, columns: Sequence[str]) -> Any:
@@ -38,6 +52,24 @@ def parse_where(text: str, columns: Sequence[str]) -> Any:
             f"instead received {text!r}"
         ) from None
     return _node(tree, columns, text)
+
+
+def parse_value(text: str, columns: Sequence[str]) -> Any:
+    """Return the Arrow expression of a number computed from columns.
+
+    Raises
+    ------
+    InputError
+        If it is none, or names a column that the library does not have.
+    """
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError):
+        raise InputError(
+            f"a key must be a column or a number computed from columns, such as "
+            f"E1_MPa/E3_MPa; instead received {text!r}"
+        ) from None
+    return _value(tree, columns, text)
 
 
 def parse_range(text: str, columns: Sequence[str]) -> Any:
@@ -112,7 +144,14 @@ def _comparison(node: ast.Compare, columns: Sequence[str], text: str) -> Any:
             parts.append(_value(left, columns, text).isin(values))
         elif type(op) in _COMPARE:
             pair = _value(left, columns, text), _value(right, columns, text)
-            parts.append(_COMPARE[type(op)](*pair))
+            computed = isinstance(op, (ast.Eq, ast.NotEq)) and (
+                _is_computed(left) or _is_computed(right)
+            )
+            parts.append(
+                _near(*pair, isinstance(op, ast.Eq))
+                if computed
+                else _COMPARE[type(op)](*pair)
+            )
         else:
             raise InputError(f"--where cannot use {ast.unparse(node)!r} in {text!r}")
         left = right
@@ -121,15 +160,61 @@ def _comparison(node: ast.Compare, columns: Sequence[str], text: str) -> Any:
     return all_of(parts)
 
 
+def _is_computed(node: ast.expr) -> bool:
+    name = isinstance(node, ast.Name) and node.id == TOTAL
+    return name or isinstance(node, (ast.BinOp, ast.Call))
+
+
+def _is_abs(node: ast.expr) -> TypeGuard[ast.Call]:
+    call = isinstance(node, ast.Call) and ast.unparse(node.func) == "abs"
+    return call and len(node.args) == 1 and not node.keywords  # type: ignore[attr-defined]
+
+
+def _near(left: Any, right: Any, equal: bool) -> Any:
+    import pyarrow.compute as pc
+
+    off = pc.abs(pc.subtract(left, right))
+    return off <= NEAR if equal else off > NEAR
+
+
+def _is_plain(value: Any) -> bool:
+    return isinstance(value, (int, float))
+
+
+def _total(columns: Sequence[str]) -> Any:
+    """Return the length of the whole rod."""
+    import pyarrow.dataset as ds
+
+    lengths = [ds.field(name) for name in columns if name.startswith("length")]
+    return functools.reduce(operator.add, lengths)
+
+
 def _value(node: ast.expr, columns: Sequence[str], text: str) -> Any:
+    import pyarrow.compute as pc
     import pyarrow.dataset as ds
 
     if isinstance(node, ast.Name):
+        if node.id == TOTAL and TOTAL not in columns:
+            return _total(columns)
         return ds.field(known(node.id, columns))
+    if isinstance(node, ast.BinOp) and type(node.op) in _OPERATIONS:
+        sides = [_value(side, columns, text) for side in (node.left, node.right)]
+        if any(isinstance(side, str) for side in sides):
+            raise InputError(f"--where cannot compute {ast.unparse(node)!r}")
+        # Whole numbers would be divided without their rest.
+        left, right = (pc.scalar(float(s)) if _is_plain(s) else s for s in sides)
+        if isinstance(node.op, ast.Div) and _is_plain(sides[1]) and sides[1] == 0.0:
+            raise InputError(f"--where divides by zero in {ast.unparse(node)!r}")
+        return _OPERATIONS[type(node.op)](left, right)
+    if _is_abs(node):
+        value = _value(node.args[0], columns, text)
+        return abs(value) if _is_plain(value) else pc.abs(value)
     if isinstance(node, ast.Constant) and type(node.value) in (int, float, str):
         return node.value
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.USub, ast.UAdd)):
         value = _value(node.operand, columns, text)
         if isinstance(value, (int, float)):
             return -value if isinstance(node.op, ast.USub) else value
+        if not isinstance(value, str):
+            return value * (-1.0 if isinstance(node.op, ast.USub) else 1.0)
     raise InputError(f"--where cannot use {ast.unparse(node)!r} in {text!r}")

@@ -21,6 +21,7 @@ from ...core.errors import InputError, StoreError
 from ...core.files import write_bytes
 from ...core.notebook import Tabular, axes_or_new
 from ..compare.metrics import position_at
+from . import ranking
 from .build import (
     MANIFEST,
     ROW_GROUP,
@@ -29,7 +30,7 @@ from .build import (
     read_manifest,
     require_pyarrow,
 )
-from .conditions import all_of, known, parse_range, parse_where
+from .conditions import all_of, parse_range, parse_where
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -80,7 +81,8 @@ def query(
     where: str | None = None,
     ranges: Sequence[str] = (),
     nearest: Centreline | None = None,
-    sort: str | None = None,
+    sort: str | Sequence[str] | None = None,
+    pareto: Sequence[str] = (),
     top: int = 20,
 ) -> Found:
     """Search a library.
@@ -94,8 +96,12 @@ def query(
     nearest : Centreline, optional
         Rank by the root mean square distance of corresponding points (equal shares of
         the arc length) from this shape, ``distance_mm``.
-    sort : str, optional
-        Column to rank by, rising; with a leading ``-`` falling.
+    sort : str or sequence of str, optional
+        Expressions to rank by (see `conditions`), rising; with a leading ``-`` falling.
+        The second decides where the first is equal, and so on.
+    pareto : sequence of str
+        Expressions of which each is wanted small, or with a leading ``-`` large: only
+        designs that no other beats in all of them, ranked by the first.
     top : int
         How many rows to return.
 
@@ -107,11 +113,12 @@ def query(
         If a condition, a column or `top` cannot be.
     """
     require_pyarrow()
-    if nearest is not None and sort is not None:
-        raise InputError("give either --nearest or --sort, not both")
+    keys = [sort] if isinstance(sort, str) else list(sort or ())
+    if sum((nearest is not None, bool(keys), bool(pareto))) > 1:
+        raise InputError("give one of --nearest, --sort and --pareto, not several")
     if not 1 <= top <= _FETCH_LIMIT:
         raise InputError(f"--top must be from 1 to {_FETCH_LIMIT}; received {top}")
-    data, manifest, missing = _open(library)
+    data, manifest, missing = open_library(library)
     columns = data.schema.names
     conditions = [parse_range(text, columns) for text in ranges]
     if where:
@@ -120,12 +127,14 @@ def query(
     with _damage_named(library, data):
         if nearest is not None:
             ranked, matched = _rank_nearest(data, condition, nearest, top)
-        elif sort is not None:
-            name = known(sort.removeprefix("-"), columns)
-            ranked, matched = _rank(data, condition, name, sort.startswith("-"), top)
+        elif keys:
+            ranked, matched = ranking.best(data, condition, keys, top)
+        elif pareto:
+            ranked, matched = ranking.front(data, condition, pareto, top)
         else:
             ranked, matched = _first(data, condition, top)
         table = _fetch(library, manifest, data, ranked)
+    table = _with_total(table)
     if nearest is not None:
         table = table.append_column("distance_mm", [ranked[:, 1]])
     return Found(
@@ -137,7 +146,12 @@ def query(
 
 
 def write_rows(found: Found, path: Path) -> None:
-    """Write the rows as ``.csv`` or ``.parquet``, whole or not at all.
+    """Write the rows as ``.csv`` or ``.parquet``, whole or not at all."""
+    write_table(found.table, path)
+
+
+def write_table(table: Any, path: Path) -> None:
+    """Write an Arrow table as ``.csv`` or ``.parquet``, whole or not at all.
 
     Raises
     ------
@@ -151,10 +165,10 @@ def write_rows(found: Found, path: Path) -> None:
     import pyarrow.parquet as pq
 
     buffer = io.BytesIO()
-    table = found.table
     if path.suffix == ".csv":
         at = table.schema.get_field_index("status")
-        table = table.set_column(at, "status", table.column(at).cast(pa.string()))
+        if at >= 0:
+            table = table.set_column(at, "status", table.column(at).cast(pa.string()))
         pc.write_csv(table, buffer, pc.WriteOptions(quoting_style="needed"))
     elif path.suffix == ".parquet":
         pq.write_table(table, buffer)
@@ -163,7 +177,8 @@ def write_rows(found: Found, path: Path) -> None:
     write_bytes(path, buffer.getvalue())
 
 
-def _open(library: Path) -> tuple[Any, dict[str, Any], int]:
+def open_library(library: Path) -> tuple[Any, dict[str, Any], int]:
+    """Return the data set, the manifest, and how many partitions are missing."""
     import pyarrow as pa
     import pyarrow.dataset as ds
 
@@ -227,17 +242,13 @@ def _first(data: Any, condition: Any, top: int) -> tuple[Array, int]:
     return np.column_stack([ids, np.zeros(len(ids))]), int(matched)
 
 
-def _rank(
-    data: Any, condition: Any, name: str, falling: bool, top: int
-) -> tuple[Array, int]:
-    def key(batch: Any) -> Array:
-        column = batch.column(name)
-        if hasattr(column, "dictionary"):
-            raise InputError(f"--sort cannot rank by {name!r}, which is no number")
-        values: Array = column.to_numpy(zero_copy_only=False).astype(np.float64)
-        return -values if falling else values
-
-    return _best(_batches(data, ["design", name], condition), key, top)
+def _with_total(table: Any) -> Any:
+    """Return the table with the length of the whole rod."""
+    lengths = [name for name in table.column_names if name.startswith("length")]
+    if not lengths or "total_length_mm" in table.column_names:
+        return table
+    total = np.sum([table.column(name).to_numpy() for name in lengths], axis=0)
+    return table.append_column("total_length_mm", [total])
 
 
 def _rank_nearest(

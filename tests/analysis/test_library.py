@@ -372,7 +372,7 @@ def test_wrong_queries_are_one_sentence(library, wrong, sentence):
 
 def test_one_ranking_at_a_time(library):
     line = solve(gmc(2), UniformField(flux_mT=9.0)).centreline
-    with pytest.raises(InputError, match="not both"):
+    with pytest.raises(InputError, match="not several"):
         query(library, sort="a_per_mm", nearest=line)
 
 
