@@ -88,23 +88,24 @@ def why_not_allowed(port: str, *, network: bool) -> str:
 
     Of pyserial's addresses only the harmless are taken: others empty files, search the
     machine or start servers. Allowed are device names, ``auto``, ``serial:NUMBER``,
-    the virtual ``twin://NAME`` and ``twinmeter://``, and, with `network`,
-    ``socket://HOST:PORT``.
+    the virtual ``twin://NAME`` and ``twinmeter://``, a meter's ``visa:RESOURCE``, and,
+    with `network`, ``socket://HOST:PORT`` and ``visa:TCPIP...``.
     """
     if "\0" in port:
         return "holds a character that no port has"
     scheme, separator, rest = port.partition("://")
+    on_network = (
+        "" if network else "is on the network; if it is meant, add network = true"
+    )
     if not separator:
-        return ""
+        return on_network if port.lower().startswith("visa:tcpip") else ""
     scheme = scheme.lower()
     if scheme == "twin":
         return _why_no_twin(rest.partition("?")[0])
     if scheme == "twinmeter":
         return ""
     if scheme == "socket":
-        return (
-            "" if network else "is on the network; if it is meant, add network = true"
-        )
+        return on_network
     return (
         "is an address of another kind; write a device name, auto, serial:NUMBER, "
         "twin://FILE.json, or socket://HOST:PORT with network = true"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from pathlib import Path
 
-from ...core.checks import finite
+from ...core.errors import InputError
 from ..stage.gap import GapStage
 from .file_edit import write_measured_gap
 
@@ -28,11 +28,16 @@ def keep_measured_gap(
 
     Raises
     ------
+    InputError
+        If no gap was assumed.
     ConfigError
         If the file has no table ``[stage]`` of its own.
     """
     map_ = stage.place_map
-    zero_mm = finite(map_.gap_at_zero_mm, "gap_at_zero_mm", "mm")
+    if map_.gap_at_zero_mm is None:
+        raise InputError(
+            "a gap must be assumed (GapStage.assume_gap) before it is kept"
+        )
     measured = {
         "gap_mm": gap_mm,
         "machine_mm": stage.status().stage_mm,
@@ -41,4 +46,4 @@ def keep_measured_gap(
         "firmware": map_.firmware,
         "settings": dict(map_.settings),
     }
-    write_measured_gap(rig_file, zero_mm, map_.direction, measured)
+    write_measured_gap(rig_file, map_.gap_at_zero_mm, map_.direction, measured)

@@ -17,6 +17,7 @@ import serial
 from ...core.errors import MeterError
 from ..clock import Check, go_on
 from ..ports import SERIAL_ERRORS, check_port, register_twin_urls, why_not_open
+from . import visa
 from .description import MeterDescription
 from .parse import parse_multiplier, parse_reply, parse_unit
 from .protocol import Flux, Sample, combine
@@ -124,6 +125,8 @@ class SerialMeter:
             logger.warning("%s: %s", self._port, error)
 
     def _open(self) -> Any:
+        if self._port.startswith(visa.PREFIX):
+            return visa.VisaPort(self._port)
         line = self._description.line
         register_twin_urls()
         try:
