@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,7 +14,8 @@ from .sim_case import field_of, rod_of
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
-    from ..sim.fields import Field, Solution, Support
+    from ..sim.fields import Field, Support
+    from ..sim.solution import Solution
 
 app = group(
     "sim",
@@ -146,6 +148,11 @@ def _summary(rod: Specimen, model: str, solution: Solution) -> dict[str, Any]:
         data["length_mm"] = line.length_mm
         data["root_moment_Nm"] = solution.root_moment_Nm
         data["error_mm"] = solution.error_mm
+        data["sag_mm"] = solution.sag_mm
+        if solution.buckled_tips_mm:
+            data["buckled_tips_mm"] = solution.buckled_tips_mm
+    elif solution.ending is not None:
+        data["ending"] = asdict(solution.ending)
     data["flux_tip_mT"] = solution.flux_tip_mT
     return data
 
@@ -165,7 +172,10 @@ def _columns(solution: Solution) -> dict[str, Any]:
     if line is None:
         return {}
     names = ("s_mm", "x_mm", "y_mm", "theta_rad", "kappa_per_mm")
-    return {name: getattr(line, name) for name in names}
+    found = {name: getattr(line, name) for name in names}
+    if solution.z_mm is not None:
+        found["z_mm"] = solution.z_mm
+    return found
 
 
 def _write(solution: Solution, rod: Specimen, out: Path) -> None:
@@ -179,6 +189,18 @@ def _write(solution: Solution, rod: Specimen, out: Path) -> None:
     solution.centreline.to_csv(out)
 
 
+def _print_ending(end: dict[str, Any]) -> None:
+    x, y = end["place_mm"]
+    typer.echo(f"  ends at      {end['load']:.5g} of the load")
+    if end["kind"] == "contact":
+        typer.echo(f"  by contact   at ({x:.3f}, {y:.3f}) mm, s = {end['s_mm']:.3f} mm")
+    else:
+        dx, dy = end["turning"]
+        typer.echo(
+            f"  in a fold    tip ({x:.3f}, {y:.3f}) mm, going ({dx:.2f}, {dy:.2f})"
+        )
+
+
 def _print(data: dict[str, Any]) -> None:
     typer.echo(f"{data['specimen']}, model {data['model']}: {data['status']}")
     if "tip_mm" in data:
@@ -187,9 +209,17 @@ def _print(data: dict[str, Any]) -> None:
         typer.echo(f"  tip angle    {data['tip_angle_deg']:.5f} deg")
         typer.echo(f"  root moment  {data['root_moment_Nm']:.6g} N m")
         typer.echo(f"  Morse index  {data['morse_index']}")
+        if data["sag_mm"] != 0.0:
+            typer.echo(f"  sag          {data['sag_mm']:.5f} mm below the clamp")
+        for x, y in data.get("buckled_tips_mm", ()):
+            typer.echo(
+                f"  buckles to   a stable shape with its tip at ({x:.5f}, {y:.5f}) mm"
+            )
         if data["status"] == "stable" and data["stable_in_space"] is False:
             typer.echo("  in space     unstable: left free, it swings out of the plane")
         typer.echo(f"  error        below {data['error_mm']:.1e} mm")
+    elif "ending" in data:
+        _print_ending(data["ending"])
     elif data["load_limit"] < 1.0:
         typer.echo(f"  branch ends  at {data['load_limit']:.4g} of the load")
     else:

@@ -35,9 +35,6 @@ from .fields import (
     MagnetField as MagnetField,
 )
 from .fields import (
-    Solution as Solution,
-)
-from .fields import (
     Support as Support,
 )
 from .fields import (
@@ -99,6 +96,12 @@ from .sensitivity.derivatives import (
 )
 from .sensitivity.derivatives import (
     sensitivities as sensitivities,
+)
+from .solution import (
+    Ending as Ending,
+)
+from .solution import (
+    Solution as Solution,
 )
 from .sources import (
     Coil as Coil,

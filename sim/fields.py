@@ -8,23 +8,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.centreline import COLUMNS, Centreline
 from ..core.checks import listed, shown, size, store, vector, within
 from ..core.errors import InputError
 from ..core.magnet import Magnet
-from ..core.notebook import Tabular, axes_or_new, plot_line
 from ..core.sources import FLUX_LIMIT_T, Cuboid, Source, Uniform
 from ..core.specimen import Specimen
 from ..core.units import cos_deg
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.axes import Axes
 
 GRAVITY_LIMIT_M_S2 = 1000.0
 """Weight beyond about a hundred g is refused as a mistaken unit."""
@@ -352,57 +346,3 @@ class Support:
     def in_plane(self) -> bool:
         """Whether the weight, if any, acts within the specimen's plane."""
         return self.gravity_m_s2[2] == 0.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Solution(Tabular):
-    """The equilibrium that the rod reaches when its load grows from zero.
-
-    Parameters
-    ----------
-    centreline : Centreline or None
-        The shape; None where there is no equilibrium.
-    status : str
-        ``stable``, ``unstable`` or ``pulled in: no equilibrium``.
-    morse_index : int
-        Number of directions, within the plane unless the solver is spatial, in which
-        the equilibrium is unstable; 0 is stable, -1 where there is none.
-    error_mm : float
-        Bound of the numerical error of any point of the shape, in mm.
-    flux_tip_mT : tuple of float
-        Flux density (x, y) at the deformed tip (at the undeformed tip where there is
-        no equilibrium), in mT.
-    root_moment_Nm : float
-        Bending moment at the clamp, in N m, counter-clockwise.
-    load_limit : float
-        Fraction of the load up to which the rod has an equilibrium continuously
-        connected to the unloaded rod: 1 where the full load is reached.
-    stable_in_space : bool or None
-        Whether the equilibrium also holds against leaving the plane; None where that
-        was not looked at (solid model) or there is no equilibrium.
-    """
-
-    centreline: Centreline | None
-    status: str
-    morse_index: int
-    error_mm: float
-    flux_tip_mT: tuple[float, float]
-    root_moment_Nm: float
-    load_limit: float = 1.0
-    stable_in_space: bool | None = None
-
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return the centreline as a table, a row a point; empty without a shape."""
-        import pandas as pd
-
-        line = self.centreline
-        return pd.DataFrame(
-            {name: getattr(line, name) for name in COLUMNS} if line else {}
-        )
-
-    def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the shape into `ax`, or into new axes of pyplot; return them."""
-        ax = axes_or_new(ax, "x (mm)", "y (mm)")
-        if self.centreline is not None:
-            plot_line(ax, self.centreline, label=self.status)
-        return ax

@@ -18,7 +18,6 @@ from .fields import (
     STABLE,
     UNSTABLE,
     Field,
-    Solution,
     Support,
     as_field,
     check_case,
@@ -27,10 +26,12 @@ from .fields import (
 from .planar.solver import GONE, ORDER, STEP, failure, solve_planar
 from .planar.swing import swing_index
 from .scaling import MOST_POINTS, field_array, rod_array, stations, stiffness_Nmm2
+from .solution import Ending, Solution
 
 Array = NDArray[np.float64]
 STATUS = (STABLE, UNSTABLE, PULLED_IN)
 NO_SUPPORT = Support()
+Case = tuple[Array, Array, float, float]
 
 
 def solve(
@@ -122,6 +123,7 @@ def solve(
         )
         refuse_outside(field, np.column_stack([x, y, 0.0 * x]) * length_mm)
         stable_in_space = index == 0 and swing_index(rod, flux, tip, STEP) == 0
+    case = rod, flux, rad_from_deg(support.clamp_angle_deg), margin
     return Solution(
         centreline=centreline,
         status=STATUS[outcome],
@@ -131,7 +133,26 @@ def solve(
         root_moment_Nm=moment * unit_Nm,
         load_limit=load,
         stable_in_space=stable_in_space,
+        ending=_ending(case, load, length_mm) if outcome == GONE else None,
+        buckled_tips_mm=_buckled(case, centreline, index, length_mm),
     )
+
+
+def _ending(case: Case, load: float, length_mm: float) -> Ending | None:
+    from .ending import ending
+
+    return ending(case, load, length_mm)
+
+
+def _buckled(
+    case: Case, line: Centreline | None, index: int, length_mm: float
+) -> tuple[tuple[float, float], ...]:
+    """Return where a straight unstable rod buckles to; nowhere, if it is no such."""
+    if line is None or index <= 0 or np.any(np.abs(line.kappa_per_mm) > 1e-12):
+        return ()
+    from .ending import buckled_tips
+
+    return buckled_tips(case, length_mm)
 
 
 @lru_cache(maxsize=256)

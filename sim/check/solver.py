@@ -26,7 +26,8 @@ from ...core.checks import listed, shown, whole
 from ...core.errors import InputError, SolverError
 from ...core.specimen import Specimen
 from ...core.units import rad_from_deg
-from ..fields import Field, Solution, Support, as_field, check_case, check_plain
+from ..fields import Field, Support, as_field, check_case, check_plain
+from ..solution import Solution
 from .energy import Discretisation, discretise, energy, hessian, lagrange, node_places
 
 Array = NDArray[np.float64]

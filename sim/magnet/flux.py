@@ -263,6 +263,12 @@ def distance(field, x, y, z):  # type: ignore[no-untyped-def]
     return nearest
 
 
+@njit(cache=True)
+def distance_at(field, x, y, z):  # type: ignore[no-untyped-def]
+    """Return `distance`, for Python."""
+    return distance(field, x, y, z)
+
+
 @njit(**PART)
 def blocked(field, x, y, z, margin):  # type: ignore[no-untyped-def]
     """Tell whether a point is within `margin` of a body, or in it."""

@@ -18,10 +18,11 @@ from ...core.checks import listed, shown
 from ...core.errors import InputError, SolverError
 from ...core.specimen import Specimen
 from ...core.units import rad_from_deg
-from ..fields import Field, Solution, Support, as_field, check_case, check_plain
+from ..fields import Field, Support, as_field, check_case, check_plain
 from ..one_rod import NO_SUPPORT, solve
 from ..planar.solver import ORDER, STEP, solve_planar
 from ..scaling import field_array, rod_array, stations
+from ..solution import Solution
 from .march import parameter_columns
 from .parameters import Change, change_of
 

@@ -38,7 +38,6 @@ from ..fields import (  # fmt: skip
     STABLE,
     UNSTABLE,
     Field,
-    Solution,
     Support,
     as_field,
     check_case,
@@ -50,6 +49,7 @@ from ..planar.solver import COARSE_ORDER as START_ORDER
 from ..planar.solver import GONE, failure, solve_planar
 from ..planar.solver import STEP as PLAIN_STEP
 from ..scaling import field_array, rod_array, stations, stiffness_Nmm2
+from ..solution import Solution
 from .march import (  # fmt: skip
     ALPHA,
     CHI,

@@ -27,7 +27,6 @@ from ..fields import (
     STABLE,
     UNSTABLE,
     Field,
-    Solution,
     Support,
     as_field,
     gap_of,
@@ -36,6 +35,7 @@ from ..fields import (
 from ..magnet.flux import UNIFORM, WIDTH, flux_at
 from ..planar.contact import load_before_touching, touches
 from ..scaling import MOST_POINTS, field_array, stations
+from ..solution import Solution
 from .march import AXIAL, C1, C3, K1, K3, MU1, MU2, WX, WY, WZ, H
 from .newton import shape, solve_pose
 from .rod import SpatialRod, SpatialSection, Vector, rod_table
@@ -123,6 +123,7 @@ class SpatialSolution:
             error_mm=self.error_mm, flux_tip_mT=self.flux_tip_mT[:2],
             root_moment_Nm=self.root_moment_Nm[2], load_limit=self.load_limit,
             stable_in_space=self.morse_index == 0 if centreline else None,
+            z_mm=self.r_mm[:, 2].copy() if centreline else None,
         )  # fmt: skip
 
     def _turn(self) -> Array:

@@ -11,8 +11,9 @@ from ...core.checks import listed, positive, shown
 from ...core.errors import InputError
 from ...core.progress import Progress, silent
 from ...core.specimen import Specimen
-from ..fields import MagnetField, Solution, Support, UniformField, check_case
+from ..fields import MagnetField, Support, UniformField, check_case
 from ..one_rod import NO_SUPPORT, solve
+from ..solution import Solution
 
 Case = tuple[Specimen, UniformField | MagnetField]
 
