@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from ..core.errors import InputError, MagbendError, StageError
 from .arguments import Arguments, Outcome, number
-from .bench.parts import Parts
+from .bench.parts import Parts, stage_of
 from .photos import actions as photo_actions
 from .runs import actions as run_actions
 from .setup import actions as setup_actions
+from .setup import gap
 
 if TYPE_CHECKING:
     from .panel import Panel
@@ -21,6 +22,8 @@ ANSWER_S = 0.6
 """A move that is refused is refused within this time; one that goes on is shown."""
 
 MOST_JOG_MM = 20.0
+NUDGE_MM = 1.0
+"""The longest jog of a stage that does not know where it is."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,14 +96,21 @@ def _connect(panel: Panel, _arguments: Arguments) -> Outcome:
 def _home(panel: Panel, _arguments: Arguments) -> Outcome:
     panel.require_free()
     return _wait(
-        panel.owner.submit("homing", lambda parts: _stage(parts).home()), "homing"
+        panel.owner.submit("homing", lambda parts: stage_of(parts).home()), "homing"
     )
 
 
 def _goto(panel: Panel, arguments: Arguments) -> Outcome:
     panel.require_free()
     gap_mm = number(arguments, "gap_mm", "mm")
-    return _go(panel, lambda _here_mm: gap_mm, gap_mm)
+
+    def act(parts: Parts) -> None:
+        stage = stage_of(parts)
+        stage.check_gap(gap_mm)
+        stage.goto_gap(gap_mm, moved=panel.owner.moved)
+
+    what = f"going to {gap_mm:.3f} mm"
+    return _wait(panel.owner.submit(what, act, target_mm=gap_mm), what)
 
 
 def _jog(panel: Panel, arguments: Arguments) -> Outcome:
@@ -113,29 +123,29 @@ def _jog(panel: Panel, arguments: Arguments) -> Outcome:
         )
     here_mm = panel.owner.gap_mm
     target_mm = None if here_mm is None else here_mm + step_mm
-    return _go(panel, lambda here: here + step_mm, target_mm)
 
-
-def _go(
-    panel: Panel, target: Callable[[float], float], target_mm: float | None
-) -> Outcome:
     def act(parts: Parts) -> None:
-        stage = _stage(parts)
-        here_mm = stage.status().gap_mm
-        if here_mm is None:
-            raise StageError("the gap is not known; home the stage first")
-        gap_mm = target(here_mm)
-        stage.check_gap(gap_mm)
-        stage.goto_gap(gap_mm, moved=panel.owner.moved)
+        stage = stage_of(parts)
+        status = stage.status()
+        if status.gap_mm is not None and not status.doubt:
+            stage.goto_gap(status.gap_mm + step_mm, moved=panel.owner.moved)
+            return
+        if status.state == "alarm":
+            raise StageError("the stage is locked: home it, or unlock it")
+        if abs(step_mm) > NUDGE_MM:
+            raise StageError(
+                f"where the stage is, is not known: home it, or jog by at most "
+                f"{NUDGE_MM:g} mm and watch the rod"
+            )
+        stage.nudge(stage.place_map.direction * step_mm)
 
-    what = "jogging" if target_mm is None else f"going to {target_mm:.3f} mm"
-    return _wait(panel.owner.submit(what, act, target_mm=target_mm), what)
+    return _wait(panel.owner.submit("jogging", act, target_mm=target_mm), "jogging")
 
 
 def _recover(panel: Panel, _arguments: Arguments) -> Outcome:
     panel.require_free()
     return _wait(
-        panel.owner.submit("recovering", lambda parts: _stage(parts).recover()),
+        panel.owner.submit("recovering", lambda parts: stage_of(parts).recover()),
         "recovering",
     )
 
@@ -145,16 +155,10 @@ def _unlock(panel: Panel, arguments: Arguments) -> Outcome:
     sure = arguments.get("confirm") is True
     return _wait(
         panel.owner.submit(
-            "unlocking", lambda parts: _stage(parts).unlock(confirm=sure)
+            "unlocking", lambda parts: stage_of(parts).unlock(confirm=sure)
         ),
         "unlocking",
     )
-
-
-def _stage(parts: Parts) -> Any:
-    if parts.stage is None:
-        raise StageError(parts.problems.get("stage", "the stage is not connected"))
-    return parts.stage
 
 
 def _wait(future: Any, what: str) -> Outcome:
@@ -186,7 +190,9 @@ COMMANDS: dict[str, Command] = {
     "design": Command(do=photo_actions.design_from),
     "setup-begin": Command(do=setup_actions.begin),
     "setup-rig": Command(do=setup_actions.set_rig),
-    "setup-gap": Command(do=setup_actions.set_gap),
+    "setup-try-direction": Command(do=gap.try_direction),
+    "setup-tell-direction": Command(do=gap.tell_direction),
+    "setup-gap": Command(do=gap.set_gap),
     "setup-show-board": Command(do=setup_actions.show_board),
     "setup-take-board": Command(do=setup_actions.take_board),
     "setup-forget-board": Command(do=setup_actions.forget_board),

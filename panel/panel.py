@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import Any
+from typing import Any, Literal
 
 from ..core.errors import CameraError, MagbendError, RigError
 from .bench.field import FieldWatch
@@ -30,6 +30,11 @@ class Panel:
         The files of the bench.
     twin : Twin, optional
         How the computed bench is opened, if the rig file names it.
+
+    Attributes
+    ----------
+    direction : {1, -1} or None
+        Which way somebody saw the stage go, in this sitting's test of the direction.
     """
 
     def __init__(self, workspace: Workspace, *, twin: Twin | None = None) -> None:
@@ -52,6 +57,7 @@ class Panel:
         self.supervisor = Supervisor(workspace, self.hub.changed)
         self.supervisor.over = self.connect
         self.jobs = Jobs(workspace, self.hub.changed)
+        self.direction: Literal[1, -1] | None = None
         self._number = 0
         self._after_s = 0.0
         self._last: Any = None

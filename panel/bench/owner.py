@@ -240,6 +240,7 @@ def stage_facts(stage: Any) -> dict[str, Any]:
         "feed_mm_min": status.feed_mm_min,
         "alarm": status.alarm,
         "pins": status.pins,
+        "doubt": status.doubt,
         "allowed_mm": [low_mm, high_mm],
         "port": identity.port,
         "firmware": identity.firmware,

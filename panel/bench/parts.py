@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from ...core.errors import MagbendError
+from ...core.errors import MagbendError, StageError
 from ..workspace import Workspace, require
 
 if TYPE_CHECKING:
@@ -70,6 +70,19 @@ class Twin:
 
     seed: int = 1
     speed: float = 1.0
+
+
+def stage_of(parts: Parts) -> GapStage:
+    """Return the stage.
+
+    Raises
+    ------
+    StageError
+        If it could not be opened: why.
+    """
+    if parts.stage is None:
+        raise StageError(parts.problems.get("stage", "the stage is not connected"))
+    return parts.stage
 
 
 def is_twin(workspace: Workspace) -> bool:

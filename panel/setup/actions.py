@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from ...core.checks import finite, positive
 from ...core.errors import ConfigError, InputError, RigError
 from ..arguments import Arguments, Outcome, number
-from ..bench.parts import Parts
 from ..toml_edit import change
 from ..workspace import now_name, require, utc_now
 from . import board
@@ -55,25 +54,6 @@ def set_rig(panel: Panel, arguments: Arguments) -> Outcome:
         panel.owner.release()
         panel.connect()
     return {"text": f"{panel.workspace.rig_path.name} written"}
-
-
-def set_gap(panel: Panel, arguments: Arguments) -> Outcome:
-    """Take a gauged gap for where the stage stands, and write it into the rig file."""
-    from ...rig import keep_measured_gap
-
-    gap_mm = number(arguments, "gap_mm", "mm")
-    panel.require_free()
-
-    def assume(parts: Parts) -> float:
-        if parts.stage is None:
-            raise RigError(parts.problems.get("stage", "the stage is not connected"))
-        zero_mm: float = parts.stage.assume_gap(gap_mm)
-        keep_measured_gap(panel.workspace.rig_path, parts.stage, gap_mm)
-        return zero_mm
-
-    zero_mm = panel.owner.submit("setting the gap", assume).result(timeout=10.0)
-    _mark(panel, "gap")
-    return {"text": f"gap_at_zero_mm = {zero_mm:.3f}"}
 
 
 def show_board(panel: Panel, arguments: Arguments) -> Outcome:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ...core.files import write_text
 
 if TYPE_CHECKING:
+    from ...rig import RigModel
     from ..panel import Panel
 
 MARKS_FILE = "panel-setup.json"
@@ -67,7 +68,7 @@ def setup_state(panel: Panel) -> dict[str, Any]:
     """Return every step with its state, the values, and what the board is set to."""
     from ...rig import ready_meters
 
-    done = done_steps(panel)
+    done, rig = done_steps(panel), panel.workspace.files().rig
     return {
         "steps": [{"name": name, "done": name in done} for name in STEPS],
         "values": rig_values(panel),
@@ -75,6 +76,7 @@ def setup_state(panel: Panel) -> dict[str, Any]:
         "meters": ["manual", "none", "twin", *ready_meters()],
         "shots": shots(panel.workspace.folder),
         "specimen": _specimen(panel),
+        "tested": panel.direction is not None or was_tested(rig),
         "audit": audit(panel),
     }
 
@@ -165,6 +167,12 @@ def _cure(number: str, board: str, said: Any) -> str:
     if number == "1" and value != 255.0:
         return "send $1=255: motors that let go lose steps between moves"
     return ""
+
+
+def was_tested(rig: RigModel | None) -> bool:
+    """Return whether somebody saw which way the stage goes."""
+    measured = rig.stage.measured if rig else None
+    return measured is not None and bool(measured.direction_tested)
 
 
 def _specimen(panel: Panel) -> dict[str, Any] | None:

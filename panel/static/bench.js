@@ -66,14 +66,14 @@ export function render(state) {
   const running = state.run.facts || state.run.starting;
   view.live.render(state);
   const facts = bench.facts;
-  say(view.gap, facts.gap_mm === null || facts.gap_mm === undefined ? "gap unknown" : `${num(facts.gap_mm, 3)} mm`);
+  say(view.gap, facts.gap_mm === null || facts.gap_mm === undefined ? facts.stage_mm === undefined || facts.stage_mm === null ? "gap unknown" : `machine ${num(facts.stage_mm, 3)} mm` : `${num(facts.gap_mm, 3)} mm`);
   const doing = bench.doing || facts.state || (running ? "a run has the bench" : "not connected");
   chip(view.state, doing, facts.state === "alarm" ? "bad" : bench.doing ? "busy" : "");
   const [kind, sentence] = TRUST[facts.position_state] ?? ["", running ? "see the page Run" : ""];
   chip(view.trust, sentence.split(":")[0], kind);
   view.trust.hidden = !sentence;
   const [low, high] = facts.allowed_mm ?? [];
-  say(view.detail, facts.state ? `${facts.position_state === "homed" ? "" : `Position ${sentence}. `}Allowed from ${num(low, 1)} to ${num(high, 1)} mm · ${facts.firmware} on ${facts.port}${facts.pins ? ` · switches ${facts.pins}` : ""}` : bench.trouble || "");
+  say(view.detail, facts.state ? `${facts.doubt ? `${facts.doubt}. ` : ""}${facts.position_state === "homed" ? "" : `Position ${sentence}. `}Allowed from ${num(low, 1)} to ${num(high, 1)} mm · ${facts.firmware} on ${facts.port}${facts.pins ? ` · switches ${facts.pins}` : ""}` : bench.trouble || "");
   drawGap(view.scale, bench);
   view.recover.hidden = view.unlock.hidden = facts.state !== "alarm";
   view.field.render(state);

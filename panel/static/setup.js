@@ -141,10 +141,11 @@ const makers = {
   },
   gap() {
     const gauge = h("input", {type: "text", inputmode: "decimal", size: 8, name: "gauge"});
-    return [h("p", {}, "Home the stage, jog until a gauge block just fits between the magnet's N face and the tip of the straight rod (or a straight dummy of its length), and say how long the gauge is. Watch that + moves away from the magnet: if it does not, turn the direction round."),
+    return [h("p", {}, "Home the stage, jog until a gauge block just fits between the magnet's N face and the tip of the straight rod (or a straight dummy of its length), and say how long the gauge is."),
       h("div", {class: "row"}, h("button", {type: "button", onclick: async () => { if (await ask("Home the stage?", "It runs to its switch. Stop (Escape) ends it at once.", "Home it")) await act("home", {}, true); }}, "Home"), [-10, -1, -0.1, 0.1, 1, 10].map((step) => h("button", {type: "button", onclick: () => act("jog", {step_mm: step}, true)}, `${step > 0 ? "+" : "−"}${Math.abs(step)}`))),
       h("p", {class: "big", id: "setup-gap"}), h("div", {class: "row"}, field("The gauge, mm", gauge), h("button", {type: "button", class: "primary", onclick: () => { const gap = typed(gauge.value); Number.isNaN(gap) ? toast("The gauge is a number of mm.", "bad") : doIt("setup-gap", {gap_mm: gap}); }}, "Set the gap")),
-      h("div", {class: "row"}, field("Direction", select("direction", [1, -1])), h("button", {type: "button", onclick: () => save({direction: -Number(known.values.direction ?? 1)})}, "Turn the direction round"))];
+      h("h3", {}, "Which way does it go?"), h("p", {}, `The first time, let the stage move by 1 mm and back, and say what you saw. ${known.tested ? "That was done." : "That has not been done on this bench."}`),
+      h("div", {class: "row"}, h("button", {type: "button", onclick: () => doIt("setup-try-direction")}, "Move by 1 mm"), h("button", {type: "button", onclick: () => doIt("setup-tell-direction", {farther: true})}, "It went farther away"), h("button", {type: "button", onclick: () => doIt("setup-tell-direction", {farther: false})}, "It came nearer"))];
   },
   interlock() {
     const names = ["min_gap_mm", "max_gap_mm", "contact_gap_mm", "feed_mm_min", "backlash_mm"];

@@ -48,7 +48,9 @@ class Served:
             answer = connection.getresponse()
             return answer.status, answer.read(), dict(answer.getheaders())
 
-    def command(self, name: str, client: str = "test", **values: Any) -> dict[str, Any]:
+    def command(
+        self, name: str, /, client: str = "test", **values: Any
+    ) -> dict[str, Any]:
         """Send a command as a page does."""
         status, body, _ = self.request(
             "POST", f"/api/{name}", values,
