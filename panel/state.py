@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -11,6 +12,7 @@ if TYPE_CHECKING:
 def compose(panel: Panel) -> dict[str, Any]:
     """Return the state that all pages share."""
     return {
+        "beat": int(time.monotonic()),  # a page that hears nothing calls us lost
         "files": _files(panel),
         "bench": _bench(panel),
         "camera": panel.sight.facts(),
