@@ -16,7 +16,8 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any
 
-from ...core.errors import MagbendError, RigError, StageError
+from ...core.errors import InputError, MagbendError, RigError, StageError
+from ...rig import InterlockError
 from .parts import Parts
 
 logger = logging.getLogger(__name__)
@@ -180,23 +181,29 @@ class BenchOwner:
     def _do(self, job: _Job) -> None:
         self._doing, self._gap_mm = job, None
         self._changed()
+        outcome, failure = self._tried(job)
+        self._doing, self._gap_mm = None, None
+        self._look()  # whoever waits for the job sees what it has changed
+        if failure is None:
+            job.future.set_result(outcome)
+        else:
+            if not isinstance(failure, (InterlockError, InputError)):
+                self._trouble = str(failure)  # a refusal is told to whoever asked
+            job.future.set_exception(failure)
+        self._changed()
+
+    def _tried(self, job: _Job) -> tuple[Any, MagbendError | None]:
         try:
             if self.parts is None and job.action != self._let_go:
                 self.parts = self._open_parts()
             outcome = job.action(self.parts)  # type: ignore[arg-type]
-            self._trouble = ""
         except MagbendError as error:
-            self._trouble = str(error)
-            job.future.set_exception(error)
+            return None, error
         except Exception as error:
             logger.exception("%s failed", job.name)
-            self._trouble = f"internal error: {type(error).__name__}: {error}"
-            job.future.set_exception(RigError(self._trouble))
-        else:
-            job.future.set_result(outcome)
-        finally:
-            self._doing, self._gap_mm = None, None
-            self._look()
+            return None, RigError(f"internal error: {type(error).__name__}: {error}")
+        self._trouble = ""
+        return outcome, None
 
     def _look(self) -> None:
         parts = self.parts

@@ -147,7 +147,11 @@ def test_a_job_is_the_command_a_person_would_type(panel: Served) -> None:
     assert panel.command("job", what="verify", runs=[name])["ok"]
     job = wait_for(
         lambda: next(
-            (j for j in panel.panel.jobs.facts() if j["status"] in ("done", "failed")),
+            (
+                job
+                for job in panel.panel.jobs.facts()
+                if job["what"] == "verify" and job["status"] in ("done", "failed")
+            ),
             None,
         )
     )
