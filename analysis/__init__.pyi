@@ -37,6 +37,9 @@ from .fit.proposals import (
 from .fit.proposals import (
     proposals as proposals,
 )
+from .fit.refit import (
+    with_refitted as with_refitted,
+)
 from .fit.result import (
     FitResult as FitResult,
 )

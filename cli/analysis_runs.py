@@ -49,6 +49,9 @@ def compare(
         None, "--out", help="One table of all runs, besides RUN/comparison.csv."
     ),
     model: str = typer.Option("rod", "--model", help="rod or solid."),
+    refit: bool = typer.Option(
+        False, "--refit", help="Also compare each model with the moduli it finds."
+    ),
     clamp_angle_deg: float = CLAMP,
     gravity_m_s2: tuple[float, float, float] = GRAVITY,
     load_factor: float = LOAD,
@@ -56,12 +59,15 @@ def compare(
     json: bool = JSON,
 ) -> None:
     """Compare measured with simulated centrelines; write comparison.csv."""
+    from ..analysis import with_refitted
     from ..analysis.compare.compare import check_any, comparison_table, write_comparison
 
     choice(model, ("rod", "solid"), "--model")
     loaded, left_out = loaded_runs(runs, unverified=unverified)
     outputs(out, *(run.path / "comparison.csv" for run in loaded))
     done = compared(loaded, left_out, model, clamp_angle_deg, gravity_m_s2, load_factor)
+    if refit:
+        done = [with_refitted(run, theory=model) for run in done]
     for run in done:
         write_comparison(run.run.path / "comparison.csv", [run])
     if out is not None:

@@ -24,6 +24,7 @@ def print_comparison(table: pd.DataFrame) -> None:
     shown = (
         ("run", "run", None), ("step", "step", "d"), ("gap mm", "gap_mm", ".1f"),
         ("flux mT", "flux_mT", ".2f"), ("model", "model", None),
+        ("moduli", "moduli", None),
         ("RMS mm", "rms_mm", ".3f"), ("max mm", "max_mm", ".3f"),
         ("tip mm", "tip_mm", ".3f"), ("tip %", "tip_percent", ".2f"),
         ("angle deg", "tip_angle_deg", ".2f"), ("R meas", "radius_measured_mm", ".1f"),

@@ -45,6 +45,7 @@ EXTRA_COLUMNS = (
     "frechet_mm", "tip_angle_measured_deg", "tip_angle_simulated_deg",
     "circularity_uniform_rod", "a_measured_per_mm", "a_simulated_per_mm",
     "a_misfit_mm", "length_measured_mm", "length_simulated_mm", "specimen", "flags",
+    "moduli",
 )  # fmt: skip
 
 LENGTH_TOLERANCE = 0.05
@@ -95,6 +96,8 @@ class Comparison:
         The distances, where status is ``ok``.
     measured, simulated : Descriptors or None
         Numbers of the two shapes.
+    moduli : {"nominal", "refitted"}
+        Whose moduli the prediction has.
     circularity_uniform_rod : float
         Circularity of a rod of one modulus with the same tip compliance, simulated in
         the same field: what grading the stiffness gains.
@@ -112,6 +115,7 @@ class Comparison:
     measured: Descriptors | None = None
     simulated: Descriptors | None = None
     circularity_uniform_rod: float = math.nan
+    moduli: str = "nominal"
 
     @property
     def ok(self) -> bool:
@@ -153,6 +157,7 @@ class Comparison:
             "length_simulated_mm": self.specimen.length_mm,
             "specimen": self.specimen.name,
             "flags": " ".join(self.flags),
+            "moduli": self.moduli,
         }
 
 
