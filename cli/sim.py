@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from . import sim_equilibria, sim_magnet, sim_navigate, sim_path, sim_sweep
+from . import sim_equilibria, sim_magnet, sim_navigate, sim_path, sim_steer, sim_sweep
 from .console import group, print_json
 from .sim_case import field_of, rod_of
 
@@ -26,6 +26,7 @@ app.command("equilibria", epilog=sim_equilibria.EXAMPLE)(sim_equilibria.equilibr
 app.command("magnet", epilog=sim_magnet.EXAMPLE)(sim_magnet.magnet)
 app.command("navigate", epilog=sim_navigate.EXAMPLE)(sim_navigate.navigate)
 app.command("path", epilog=sim_path.EXAMPLE)(sim_path.path)
+app.command("steer", epilog=sim_steer.EXAMPLE)(sim_steer.steer)
 app.command("sweep", epilog=sim_sweep.EXAMPLE)(sim_sweep.sweep)
 
 SHAPE_EXAMPLE = (

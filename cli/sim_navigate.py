@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import print_json
+from .sim_case import field_of, rod_of
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
@@ -69,7 +70,7 @@ def navigate(
     from ..sim import Support
     from ..sim import navigate as navigation
 
-    rod = _specimen(gmc, specimen)
+    rod = rod_of(gmc, specimen)
     field = _field(field_mT, angle_deg, magnet, gap_mm, poses)
     place = navigation.read_lumen(lumen)
     if out is not None:
@@ -87,23 +88,11 @@ def navigate(
     )
     data = _summary(passage)
     if out is not None:
-        _write(out, place, passage, rod, data)
+        write_passage(out, place, passage, rod)
     if as_json:
         print_json(data | {"steps": [_row(step) for step in passage.steps]})
     else:
         _print(data, passage)
-
-
-def _specimen(gmc: int | None, file: Path | None) -> Specimen:
-    if (gmc is None) == (file is None):
-        raise typer.BadParameter("give either --gmc 1..7 or --specimen FILE")
-    if gmc is not None:
-        from ..sim import gmc as table1
-
-        return table1(gmc)
-    from ..core.specimen_file import read_specimen
-
-    return read_specimen(Path(str(file)))
 
 
 def _field(
@@ -116,20 +105,12 @@ def _field(
     from ..sim import UniformField
     from ..sim.navigate import moving, read_poses
 
-    if field_mT is not None and file is not None:
-        raise typer.BadParameter("give either --field-mT B or --magnet FILE")
-    if gap_mm is not None and file is None:
-        raise typer.BadParameter("--gap-mm belongs to --magnet")
-    field: Field = UniformField(flux_mT=field_mT or 0.0, angle_deg=angle_deg)
     table = read_poses(poses) if poses is not None else []
-    if file is not None:
-        from ..sim import read_field
-
-        field = read_field(file)
-        if gap_mm is not None:
-            field = field.at_gap(gap_mm)
-        elif field.follows_gap and "gap_mm" not in (table or [{}])[0]:
-            raise typer.BadParameter("--magnet needs --gap-mm D, or poses with gap_mm")
+    field: Field = UniformField(flux_mT=0.0, angle_deg=angle_deg)
+    if field_mT is not None or file is not None or gap_mm is not None:
+        field = field_of(file, gap_mm, field_mT, angle_deg)
+    if field.follows_gap and "gap_mm" not in (table or [{}])[0]:
+        raise typer.BadParameter("--magnet needs --gap-mm D, or poses with gap_mm")
     return moving(field, table) if table else field
 
 
@@ -174,9 +155,8 @@ def _row(step: Any) -> dict[str, Any]:
     return row
 
 
-def _write(
-    folder: Path, lumen: Lumen, passage: Passage, rod: Specimen, data: dict[str, Any]
-) -> None:
+def write_passage(folder: Path, lumen: Lumen, passage: Passage, rod: Specimen) -> None:
+    """Write tables, figure and film of a passage into a folder."""
     import pandas as pd
 
     from ..core.files import write_text
@@ -195,7 +175,7 @@ def _write(
     table = pd.DataFrame(contacts, columns=heads)
     write_text(folder / "contacts.csv", table.to_csv(index=False))
     passage.steps[-1].centreline.to_csv(folder / "shape.csv")
-    write_json(folder / "passage.json", data)
+    write_json(folder / "passage.json", _summary(passage))
     side_mm = max(rod.sides_mm)
     draw_passage(folder / "passage.png", lumen, passage, side_mm=side_mm)
     film(folder / "passage.gif", lumen, passage, side_mm=side_mm)

@@ -35,7 +35,7 @@ WIDTH = 2.5
 TASKS = ("45 degrees", "90 degrees", "180 degrees", "S", "fork")
 LIMIT = 50.0
 """A push this many times what the rod carries across a gap ends the attempt."""
-STRAIN = 0.1
+STRAIN = 0.2
 """A rod whose outer fibre is strained more has folded, and has not passed."""
 
 
@@ -59,7 +59,7 @@ def lumens(side_mm: float) -> dict[str, Lumen]:
     legs = {
         "45 degrees": [(4.0, 0.0), (10.0, 45.0), (10.0, 0.0)],
         "90 degrees": [(4.0, 0.0), (13.0, 90.0), (8.0, 0.0)],
-        "180 degrees": [(3.0, 0.0), (12.0, 180.0), (10.0, 0.0)],
+        "180 degrees": [(2.0, 0.0), (14.0, 180.0), (8.0, 0.0)],
         "S": [(4.0, 0.0), (8.0, 60.0), (8.0, -60.0), (5.0, 0.0)],
     }
     out = {
@@ -120,8 +120,12 @@ class Outcome:
 
 def bow_mm(passage: Passage) -> float:
     """Return how far the rod ever was off its line before the mouth, in mm."""
-    outside = [abs(y[x < 0.0]) for x, y in (step.shape[:2] for step in passage.steps)]
-    return float(max(y.max(initial=0.0) for y in outside))
+    most = 0.0
+    for step in passage.steps:
+        x, y = step.shape[:2]
+        inside = int(np.argmax(x >= 0.0))  # the first point within the lumen
+        most = max(most, float(abs(y[:inside]).max(initial=0.0)))
+    return most
 
 
 def outcome(task: str, passage: Passage, side_mm: float) -> Outcome:

@@ -17,3 +17,8 @@ from .passage import Passage as Passage
 from .passage import Step as Step
 from .poses import moving as moving
 from .solver import navigate as navigate
+from .steering import Reach as Reach
+from .steering import Steered as Steered
+from .steering import plan_of as plan_of
+from .steering import poses_text as poses_text
+from .steering import steer as steer

@@ -13,6 +13,7 @@ from .lumen import Lumen
 from .passage import Passage, Step
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
 FRAMES = 80
@@ -84,20 +85,24 @@ def film(path: Path, lumen: Lumen, passage: Passage, *, side_mm: float) -> None:
     from ...core.files import write_bytes
 
     steps = passage.steps[:: max(1, -(-len(passage.steps) // FRAMES))]
+    figure = Figure(figsize=(5.6, 4.2), dpi=80, layout="constrained")
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    _lumen(axes, lumen, passage)
+    title = axes.set_title(" ", fontsize=9)
+    canvas.draw()
+    figure.set_layout_engine("none")
     frames: list[Any] = []
     for step in (*steps, passage.steps[-1]):
-        figure = Figure(figsize=(5.6, 4.2), dpi=90, layout="constrained")
-        canvas = FigureCanvasAgg(figure)
-        axes = figure.add_subplot()
-        _lumen(axes, lumen, passage)
-        _rod(axes, step, side_mm)
-        axes.set_title(
+        drawn = _rod(axes, step, side_mm)
+        title.set_text(
             f"{step.insertion_mm:.1f} mm in, push {1e3 * step.push_N:.2f} mN, "
-            f"{len(step.contacts)} contacts",
-            fontsize=9,
+            f"{len(step.contacts)} contacts"
         )
         canvas.draw()
         frames.append(Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3]))
+        for artist in drawn:
+            artist.remove()
     buffer = io.BytesIO()
     frames = [frame.quantize(64) for frame in frames]
     frames[0].save(
@@ -124,19 +129,21 @@ def _lumen(axes: Axes, lumen: Lumen, passage: Passage) -> None:
     axes.set_ylabel("y in mm")
 
 
-def _rod(axes: Axes, step: Step, side_mm: float) -> None:
+def _rod(axes: Axes, step: Step, side_mm: float) -> list[Artist]:
     """Draw the rod with its thickness, and where it is pressed, by how much."""
     x, y, theta, _ = step.shape
     nx, ny = -0.5 * side_mm * np.sin(theta), 0.5 * side_mm * np.cos(theta)
-    axes.fill(
+    drawn: list[Artist] = axes.fill(
         np.concatenate([x + nx, (x - nx)[::-1]]),
         np.concatenate([y + ny, (y - ny)[::-1]]),
         color="C0", alpha=0.75, lw=0,
     )  # fmt: skip
     if step.contacts:
         force = np.array([contact.force_N for contact in step.contacts])
-        axes.scatter(
+        dots = axes.scatter(
             [contact.x_mm for contact in step.contacts],
             [contact.y_mm for contact in step.contacts],
             s=6.0 + 60.0 * force / force.max(), color="C3", zorder=3, lw=0,
         )  # fmt: skip
+        drawn.append(dots)
+    return drawn
