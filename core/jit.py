@@ -10,16 +10,24 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import os
 import threading
 from collections.abc import Callable
 from contextvars import ContextVar
+from pathlib import Path
 from types import CodeType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 Result = TypeVar("Result")
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 PATIENCE = 5_000
 """Calls of kernels, a few tenths of a second, after which a task goes on compiled."""
+
+FIRST_CALLS = 20
+"""Calls of a public function that run as plain Python before anything is compiled."""
+MOST = 50_000
+"""Calls of kernels, about a second, that such a call may take."""
 
 _LOCK = threading.RLock()
 _calls_left: ContextVar[list[int] | None] = ContextVar("calls_left", default=None)
@@ -101,6 +109,21 @@ class Kernel:
         return file is not None and bool(file._load_index())
 
     @property
+    def is_at_hand(self) -> bool:
+        """Whether machine code is loaded, or seems to wait in the usual place.
+
+        Without a look by numba, whose import takes longer than a first solve.
+        """
+        if self._compiled is not None:
+            return True
+        code = self._function.__code__
+        source = Path(os.environ.get("NUMBA_CACHE_DIR") or code.co_filename)
+        if source.is_dir():
+            return self.is_stored
+        name = f"{source.stem}.{self._function.__name__}-{code.co_firstlineno}."
+        return any(source.parent.glob(f"__pycache__/{name}*.nbi"))
+
+    @property
     def _numba_type_(self) -> Any:
         """What numba takes this for where another kernel calls it."""
         return self.compiled._numba_type_
@@ -165,3 +188,40 @@ def once(task: Callable[[], Result], *, patience: int | None = None) -> Result:
     finally:
         _calls_left.reset(token)
     return task()
+
+
+def plain_first(
+    kernel: Kernel, fits: Callable[..., bool] = lambda *_args, **_options: True
+) -> Callable[[Function], Function]:
+    """Make a function run as plain Python until compiling is worth while.
+
+    Where no machine code of its `kernel` is at hand the first `FIRST_CALLS` calls of a
+    process go through `once`: they take milliseconds, and compiling ten seconds. After
+    them, or once the kernel is compiled for another reason, it runs compiled. The count
+    of calls decides, not their time: a program gives the same digits each time.
+
+    Parameters
+    ----------
+    kernel : Kernel
+        The one that the function needs most.
+    fits : callable, optional
+        Tells of arguments whether plain Python is quick enough for them.
+    """
+
+    def decorate(function: Function) -> Function:
+        left = [FIRST_CALLS]
+
+        @functools.wraps(function)
+        def call(*args: Any, **options: Any) -> Any:
+            if left[0] > 0:
+                if _calls_left.get() is None and not kernel.is_at_hand:
+                    if fits(*args, **options):
+                        left[0] -= 1
+                        return once(lambda: function(*args, **options), patience=MOST)
+                elif kernel.is_at_hand:
+                    left[0] = 0
+            return function(*args, **options)
+
+        return cast("Function", call)
+
+    return decorate

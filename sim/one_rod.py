@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..core.centreline import Centreline
 from ..core.checks import shown, whole
 from ..core.errors import InputError
+from ..core.jit import plain_first
 from ..core.specimen import Specimen
 from ..core.units import mT_from_T, rad_from_deg
 from .fields import (
@@ -23,7 +24,7 @@ from .fields import (
     check_case,
     refuse_outside,
 )
-from .planar.solver import GONE, ORDER, STEP, failure, solve_planar
+from .planar.solver import GONE, ORDER, STEP, failure, solve_planar, solve_rows
 from .planar.swing import swing_index
 from .scaling import MOST_POINTS, field_array, rod_array, stations, stiffness_Nmm2
 from .solution import Ending, Solution
@@ -34,6 +35,7 @@ NO_SUPPORT = Support()
 Case = tuple[Array, Array, float, float]
 
 
+@plain_first(solve_rows)
 def solve(
     specimen: Specimen,
     field: Field,

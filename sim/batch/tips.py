@@ -8,6 +8,7 @@ shapes instead of tips see `batch.shapes.solve_shapes`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.checks import shown, whole
 from ...core.cross_section import ALL_SIZES, SIZES
 from ...core.errors import InputError
+from ...core.jit import plain_first
 from ...core.magnet import Magnet
 from ...core.progress import Progress, silent
 from ..fields import PULLED_IN, STABLE, UNSTABLE, Field, before
@@ -46,8 +48,20 @@ _STEP = 0.4
 _WIDE = ("length_mm", "E_MPa")
 _PER_SECTION = (*ALL_SIZES, "remanence_mT")
 _MOST_THREADS = 1024
+FEW = 1000
+"""Numbers in a column that plain Python gets through in about a second."""
 
 
+def _are_few(designs: Any, **_options: object) -> bool:
+    """Tell whether so few designs are given that compiling takes longer."""
+    try:
+        names = designs.dtype.names if isinstance(designs, np.ndarray) else designs
+        return max(np.size(designs[name]) for name in names) <= FEW
+    except (TypeError, KeyError, IndexError, ValueError):
+        return True  # solve_many tells what is wrong with them
+
+
+@plain_first(solve_lanes, _are_few)
 def solve_many(
     designs: Mapping[str, ArrayLike] | NDArray[np.void],
     *,

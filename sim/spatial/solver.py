@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ...core.centreline import Centreline
 from ...core.checks import shown, vector, whole
 from ...core.errors import InputError, SolverError
+from ...core.jit import plain_first
 from ...core.specimen import Specimen
 from ...core.units import mT_from_T, rad_from_deg
 from ..fields import (
@@ -141,6 +142,7 @@ class SpatialSolution:
         return "\n".join([names, *rows]) + "\n"
 
 
+@plain_first(solve_pose)
 def solve_spatial(
     rod: SpatialRod | Specimen,
     field: Field | Sequence[float],

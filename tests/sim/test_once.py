@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -91,3 +95,32 @@ def test_equilibria_and_folds() -> None:
     ]
     assert folds[0] == pytest.approx(folds[1], rel=1e-9)
     assert len(folds[0]) > 0
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "solve(gmc(2), MagnetField(magnet=Magnet.cube(55.0, 1.3), gap_mm=60.0))",
+        "solve_spatial(gmc(2), UniformField(flux_mT=50.0))",
+        "solve_many({'length_mm': [10, 20], 'E_MPa': [20, 10], 'side_mm': 1.0,"
+        " 'remanence_mT': 20.0, 'flux_mT': [30.0, 50.0]})",
+    ],
+)
+def test_the_first_call_from_python_compiles_nothing(call: str, tmp_path: Path) -> None:
+    code = (
+        "import sys\n"
+        "from magbend.core.magnet import Magnet\n"
+        "from magbend.sim import gmc, solve, solve_many, solve_spatial\n"
+        "from magbend.sim import MagnetField, UniformField\n"
+        f"{call}\n"
+        "from magbend.core.jit import Kernel\n"
+        "import gc\n"
+        "kernels = [one for one in gc.get_objects() if isinstance(one, Kernel)]\n"
+        "made = [k for k in kernels if k._compiled and k._compiled.overloads]\n"
+        "print(len(kernels) > 50, len(made))\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True,
+        env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)},
+    )  # fmt: skip
+    assert done.stdout.split() == ["True", "0"]
