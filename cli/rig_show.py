@@ -38,6 +38,7 @@ def print_dry_run(plan: Plan, as_json: bool) -> None:
             {
                 "index": step.index,
                 "kind": step.kind,
+                "settings": dict(step.settings),
                 "gap_mm": step.gap_mm,
                 "stage_mm": step.stage_mm,
                 "move_mm": step.move_mm,
@@ -89,6 +90,12 @@ def _weight(plan: Plan) -> str:
 
 
 def _dry_line(row: dict[str, Any]) -> str:
+    """Return a step as a row of the table, with what other axes are set to."""
+    settings = "".join(f"  {n} = {v:g}" for n, v in row["settings"].items())
+    return _dry_row(row) + settings
+
+
+def _dry_row(row: dict[str, Any]) -> str:
     stage = "-" if row["stage_mm"] is None else f"{row['stage_mm']:.2f}"
     line = (
         f"{row['index'] + 1:4d} {row['kind']:<11} {row['gap_mm']:7.2f} {stage:>9} "

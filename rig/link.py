@@ -176,7 +176,7 @@ class Link:
             data = port.read(1)
             if data:
                 data += port.read(port.in_waiting)
-        except (*SERIAL_ERRORS, TypeError) as error:  # TypeError: closed in the middle
+        except SERIAL_ERRORS as error:
             raise self._lost(error) from None
         self._buffer += data
         self._unlogged += data
@@ -195,7 +195,7 @@ class Link:
     def _waiting(self) -> bool:
         try:
             return bool(self._require_open().in_waiting)
-        except (*SERIAL_ERRORS, TypeError) as error:
+        except SERIAL_ERRORS as error:
             raise self._lost(error) from None
 
     def _take_line(self) -> str | None:

@@ -163,7 +163,8 @@ def twin_under(port: str, folder: Path) -> str:
 
 
 def _serial_errors() -> tuple[type[Exception], ...]:
-    found: list[type[Exception]] = [OSError, ValueError]
+    # TypeError: a port that another thread closes in the middle of a read.
+    found: list[type[Exception]] = [OSError, ValueError, TypeError]
     with contextlib.suppress(ImportError):  # Windows has none
         import termios
 

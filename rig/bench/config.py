@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from ...core.errors import ConfigError
 from ...core.magnet import Vector
@@ -20,6 +20,7 @@ from ...core.specimen import Specimen
 from ...core.specimen_file import MagnetModel, SpecimenModel, read_specimen
 from ...core.toml import FileModel, line_of, read_text, read_toml
 from ...core.units import GRAVITY_M_PER_S2
+from ..axes.config import AxisConfig, ScanConfig, why_not_set
 from ..camera.config import CameraConfig
 from ..meter.config import MeterConfig
 from ..stage.config import LimitsConfig, StageConfig
@@ -110,8 +111,16 @@ class RigModel(FileModel):
     camera: CameraConfig = CameraConfig()
     meter: MeterConfig = MeterConfig()
     magnet: MagnetModel | None = None
+    axis: list[AxisConfig] = Field(default_factory=list)
     settle: SettleConfig | None = None
     twin: TwinConfig = TwinConfig()
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> RigModel:
+        names = [axis.name for axis in self.axis]
+        if len(set(names)) != len(names):
+            raise ValueError("every [[axis]] must have a name of its own")
+        return self
 
 
 class PlanModel(FileModel):
@@ -128,6 +137,7 @@ class PlanModel(FileModel):
     repeats: int = Field(default=1, ge=1, le=1000)
     reference: bool = False
     reference_gap_mm: PositiveFloat | None = None
+    scan: list[ScanConfig] = Field(default_factory=list)
     settle: SettleConfig | None = None
     photograph: PhotographConfig = PhotographConfig()
     flux: FluxConfig = FluxConfig()
@@ -190,6 +200,7 @@ class Plan:
         data.pop("specimen")
         data["gaps_mm"] = list(self.gaps_mm)
         data["stops"] = [stop.kind for stop in self.stops]
+        data["settings"] = [dict(stop.settings) for stop in self.stops]
         data["rig"] = self.rig_path.name
         data["settle"] = self.settle.model_dump(mode="json")
         return data
@@ -258,6 +269,7 @@ def _check_gaps(
             raise ConfigError(
                 f"{where}: {name} = {gap_mm:g} mm {reason} ({rig_path.name}, {keys})"
             )
+    _check_scans(path, text, model, rig, rig_path)
     wrong = out_of_order(model.gaps_mm) if model.order == "falling" else None
     if wrong is not None:
         raise ConfigError(
@@ -268,8 +280,34 @@ def _check_gaps(
         )
 
 
+def _check_scans(
+    path: Path, text: str, model: PlanModel, rig: RigModel, rig_path: Path
+) -> None:
+    """Refuse to scan what the rig has not, twice, or beyond its limits."""
+    line = line_of(text, ("scan",))
+    where = f"{path}, line {line}" if line else f"{path}"
+    axes = {axis.name: axis for axis in rig.axis}
+    seen: set[str] = set()
+    for scan in model.scan:
+        if scan.axis not in axes:
+            known = ", ".join(axes) or "none"
+            raise ConfigError(
+                f"{where}: scan.axis = {scan.axis!r} is no [[axis]] of {rig_path.name} "
+                f"(there: {known})"
+            )
+        if scan.axis in seen:
+            raise ConfigError(f"{where}: {scan.axis} is scanned twice")
+        seen.add(scan.axis)
+        for value in scan.values:
+            why = why_not_set(axes[scan.axis], value)
+            if why:
+                raise ConfigError(f"{where}: {scan.axis} {why} ({rig_path.name})")
+
+
 def _stops(model: PlanModel, rig: RigModel) -> tuple[Stop, ...]:
     far_mm = model.reference_gap_mm or rig.limits.max_gap_mm
+    scans = {scan.axis: scan.values for scan in model.scan}
+    rest = {a.name: a.rest for a in rig.axis if a.rest is not None and a.name in scans}
     return stops_of(
         Route(
             gaps_mm=model.gaps_mm,
@@ -279,6 +317,8 @@ def _stops(model: PlanModel, rig: RigModel) -> tuple[Stop, ...]:
             far_mm=far_mm,
             reference=model.reference,
             baseline=model.flux.baseline,
+            scans=scans,
+            rest=rest,
         )
     )
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import logging
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 
 from ...core.errors import MagbendError
+from ..axes.line import Axis
 from ..camera.protocol import Camera
 from ..clock import Clock, utc_text
 from ..meter.protocol import Meter
@@ -21,7 +22,8 @@ logger = logging.getLogger(__name__)
 class Devices:
     """An open stage, camera and Tesla-meter, and the clock that they share.
 
-    `log`, where there is one, waits for a folder that somebody owns.
+    `log`, where there is one, waits for a folder that somebody owns; `axes` are what a
+    plan scans beside the gap, by name.
     """
 
     stage: GapStage
@@ -29,6 +31,7 @@ class Devices:
     meter: Meter
     clock: Clock
     log: WireLog | None = None
+    axes: Mapping[str, Axis] = field(default_factory=dict)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -41,7 +44,7 @@ class Devices:
 
     def close(self) -> None:
         """Let every device go, also when one of them refuses."""
-        for device in (self.camera, self.meter, self.stage):
+        for device in (self.camera, self.meter, self.stage, *self.axes.values()):
             try:
                 device.close()
             except MagbendError as error:

@@ -10,6 +10,7 @@ from ...core.errors import CameraError, ConfigError, MeterError
 from ...core.plugin_options import checked_options
 from ...core.plugins import load_plugin, offered
 from ...core.urls import without_secrets
+from ..axes.line import Axis
 from ..camera.capture import CaptureCamera, Source
 from ..camera.config import OWN_BACKENDS, CameraConfig
 from ..camera.protocol import Camera, NoCamera
@@ -246,5 +247,23 @@ def open_devices(
         camera: Camera = NoCamera()
         if with_camera:
             camera = open_camera(plan.rig.camera, folder, clock)
+            opened.callback(camera.close)
+        axes: dict[str, Axis] = {}
+        for scan in plan.model.scan:
+            axes[scan.axis] = _open_axis(plan.rig, scan.axis, clock, log)
+            opened.callback(axes[scan.axis].close)
         opened.pop_all()
-    return Devices(stage=stage, camera=camera, meter=meter, clock=clock, log=log)
+    return Devices(
+        stage=stage, camera=camera, meter=meter, clock=clock, log=log, axes=axes
+    )
+
+
+def _open_axis(rig: RigModel, name: str, clock: Clock, log: WireLog | None) -> Axis:
+    from ..axes.line import LineAxis
+
+    config = next(axis for axis in rig.axis if axis.name == name)
+    if config.driver == "twin":
+        raise ConfigError(
+            f"axis {name}: driver twin is the computed bench: name its real driver"
+        )
+    return LineAxis(config, clock, log=log)

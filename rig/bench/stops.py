@@ -59,6 +59,8 @@ class Route:
         Whether there are such.
     scans : mapping of str to sequence of float
         Values of other axes, each at each gap.
+    rest : mapping of str to float
+        What axes are set to for references and baselines.
     """
 
     gaps_mm: Sequence[float]
@@ -69,13 +71,14 @@ class Route:
     reference: bool
     baseline: bool
     scans: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    rest: Mapping[str, float] = field(default_factory=dict)
 
 
 def stops_of(route: Route) -> tuple[Stop, ...]:
     """Return every step of a run, in turn."""
     stops: list[Stop] = []
     if route.reference:
-        stops.append(Stop(gap_mm=route.far_mm, kind="reference"))
+        stops.append(Stop(gap_mm=route.far_mm, kind="reference", settings=route.rest))
     for turn in range(1, route.repeats + 1):
         for kind, gap_mm in _turn(route):
             stops += [
@@ -83,7 +86,7 @@ def stops_of(route: Route) -> tuple[Stop, ...]:
                 for settings in _settings(route.scans)
             ]
     if route.baseline:
-        stops.append(Stop(gap_mm=route.far_mm, kind="baseline"))
+        stops.append(Stop(gap_mm=route.far_mm, kind="baseline", settings=route.rest))
     return tuple(stops)
 
 

@@ -276,7 +276,7 @@ class SerialMeter:
         self._check()
         try:
             data = bytes(self._device.read(max(self._device.in_waiting, 1)))
-        except (*SERIAL_ERRORS, TypeError) as error:
+        except SERIAL_ERRORS as error:
             raise self._lost(error) from None
         if data:
             self._told("<<", data)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..bench.config import Plan
@@ -30,6 +31,8 @@ class PlannedStep:
         Distance from the step before (from the farthest gap, for the first).
     time_s : float
         Estimate of the whole step, with the rod settling in the fixed time.
+    settings : mapping of str to float
+        What other axes are set to.
     """
 
     index: int
@@ -38,6 +41,7 @@ class PlannedStep:
     stage_mm: float | None
     move_mm: float
     time_s: float
+    settings: Mapping[str, float]
 
 
 def plan_steps(plan: Plan) -> tuple[PlannedStep, ...]:
@@ -66,6 +70,7 @@ def plan_steps(plan: Plan) -> tuple[PlannedStep, ...]:
             PlannedStep(
                 index=index,
                 kind=stop.kind,
+                settings=stop.settings,
                 gap_mm=gap_mm,
                 move_mm=move_mm,
                 time_s=move_s + fixed_s,

@@ -50,6 +50,7 @@ def make_manifest(plan: Plan, devices: Devices, *, twin: bool) -> Record:
             "stage_limits": dataclasses.asdict(devices.stage.limits),
             "camera": devices.camera.identity,
             "meter": devices.meter.identity,
+            "axes": {name: axis.identity for name, axis in devices.axes.items()},
         },
         "versions": _versions(),
         "host": socket.gethostname(),

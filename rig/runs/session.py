@@ -134,6 +134,7 @@ class Session:
         self.state.tell(step=index + 1, state="moving")
         was_paused = self._pause()
         move, was_held = self._go_to(gap_mm)
+        settings = self._set_axes(stop)
         devices.camera.at_step(index, gap_mm)
         self.state.tell(state="settling", gap_mm=move.gap_mm)
         was_paused = self._pause() or was_held or was_paused
@@ -161,6 +162,7 @@ class Session:
             "index": index,
             "kind": stop.kind,
             "turn": stop.turn,
+            "settings": settings,
             "gap_mm": gap_mm,
             "gap_reached_mm": move.gap_mm,
             "stage_mm": move.stage_mm,
@@ -222,6 +224,21 @@ class Session:
                 how = self.devices.stage.hold().sentence()
                 self.report(f"pausing: {how}")
                 was_paused = self._pause()
+
+    def _set_axes(self, stop: Stop) -> dict[str, float]:
+        """Set what the step asks of other axes; return what they are then."""
+        return {
+            name: self.devices.axes[name].set(value, check=self._check)
+            for name, value in stop.settings.items()
+            if name in self.devices.axes
+        }
+
+    def _rest_axes(self) -> None:
+        """Leave no current on and no magnet turned: axes go to their rest."""
+        for axis in self.plan.rig.axis:
+            if axis.rest is not None and axis.name in self.devices.axes:
+                with _best_effort(f"bringing {axis.name} to rest"):
+                    self.devices.axes[axis.name].set(axis.rest)
 
     def _look(self, gap_mm: float) -> None:
         self.state.tell(gap_mm=gap_mm)
@@ -288,6 +305,7 @@ class Session:
                 proof = stage.last_stop
             if status == "abort" and proof and proof.sentence() not in reason:
                 reason = f"{reason}: {proof.sentence()}"
+        self._rest_axes()
         try:
             end = self.folder.finish(status, reason)
             status, reason = end["status"], end["reason"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from ...core.derived import FileFinding, check_derived, compare_digest, read_man
 from ...core.errors import StoreError
 from .map_check import map_problems
 from .read import Run, read_run
-from .records import END_FILE, IMAGES, PLAN_FILE, RUN_FILE, STEPS_FILE
+from .records import END_FILE, IMAGES, PLAN_FILE, RUN_FILE, STEPS_FILE, Record
 from .verify_files import check_files, check_records
 
 
@@ -95,6 +95,7 @@ def check_used(run: Run, names: Iterable[str]) -> list[FileFinding]:
 def _steps(run: Run) -> list[str]:
     problems: list[str] = []
     gaps_mm = run.manifest.get("plan", {}).get("gaps_mm", [])
+    settings = run.manifest.get("plan", {}).get("settings") or []
     indices = {step["index"] for step in run.steps}
     if run.is_finished:
         missing = sorted(set(range(len(gaps_mm))) - indices)
@@ -108,6 +109,9 @@ def _steps(run: Run) -> list[str]:
                 f"step {index}: gap_mm is {step.get('gap_mm')}, the plan says "
                 f"{gaps_mm[index]}"
             )
+        asked = settings[index] if 0 <= index < len(settings) else {}
+        off = _off(step.get("settings") or {}, asked, run.manifest)
+        problems += [f"step {index}: {sentence}" for sentence in off]
         if not step["files"]:
             problems.append(f"step {index}: has no photograph")
     counted = (run.end or {}).get("steps", len(run.steps))
@@ -116,6 +120,17 @@ def _steps(run: Run) -> list[str]:
             f"{END_FILE} counts {counted} steps, {STEPS_FILE} holds {len(run.steps)}"
         )
     return problems
+
+
+def _off(
+    found: dict[str, float], asked: dict[str, float], manifest: Record
+) -> Iterator[str]:
+    """Yield what stood elsewhere than the plan asked, beyond its tolerance."""
+    axes = {axis["name"]: axis for axis in manifest.get("rig", {}).get("axis") or []}
+    for name, value in asked.items():
+        tolerance = float(axes.get(name, {}).get("tolerance", 0.0)) + 1e-9
+        if name not in found or abs(found[name] - value) > tolerance:
+            yield f"{name} is {found.get(name)}, the plan says {value:g}"
 
 
 def _first_format(run: Run) -> list[FileFinding]:

@@ -12,6 +12,7 @@ from ..clock import Clock, SteppedClock
 from ..stage.gap import GapStage
 from ..stage.make import make_stage
 from ..wire_log import WireLog
+from .axis import VirtualAxis
 from .board.file import Board, make_board
 from .board.marlin import MarlinBoard
 from .board.plant import Plant
@@ -102,4 +103,7 @@ def open_twin(
     stage.connect()
     parts = TwinParts(board=board, camera=eye, meter=probe, clock=clock, gap=gap_mm)
     schedule_faults(rig.twin.fault, parts)
-    return Devices(stage=stage, camera=eye, meter=probe, clock=clock, log=log)
+    axes = {axis.name: VirtualAxis(axis, clock) for axis in rig.axis}
+    return Devices(
+        axes=axes, stage=stage, camera=eye, meter=probe, clock=clock, log=log
+    )
