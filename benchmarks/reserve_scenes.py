@@ -28,9 +28,9 @@ from magbend.vision.synthetic import (
     scene_camera,
 )
 
-KINDS = ("plain", "light", "clutter", "telephone", "colour", "blur")
+KINDS = ("plain", "light", "clutter", "telephone", "colour", "blur", "mixed")
 """Plain; hard light; things beside the rod; f = 4 mm lens and tilt; rod, paper and
-clamp of any colour; defocus, motion, grain or gloss."""
+clamp of any colour; defocus, motion, grain or gloss; several of these at once."""
 
 WHITE = (0.62, 0.62, 0.60)
 CREAM = (0.52, 0.64, 0.68)
@@ -65,7 +65,9 @@ def draw_case(seed: int, index: int) -> Case:
     kind = KINDS[index % len(KINDS)]
     rng = np.random.default_rng([seed, index])
     while True:
-        camera = _camera(rng, telephone=kind == "telephone")
+        camera = _camera(
+            rng, telephone=kind == "telephone" or (kind == "mixed" and index % 2 == 0)
+        )
         scene = _plain(rng, camera)
         if scene is not None:
             break
@@ -78,6 +80,8 @@ def draw_case(seed: int, index: int) -> Case:
         scene, words = _coloured(rng, scene)
     elif kind == "blur":
         scene, words = _blurred(rng, scene)
+    elif kind == "mixed":
+        scene, words = _mixed(rng, scene, camera)
     picture = render_scene(scene, camera, rng)
     quality = int(rng.choice([80, 90, 95, 100]))
     _, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])
@@ -157,6 +161,20 @@ def _hard_light(rng: np.random.Generator, scene: Scene) -> Scene:
     return replace(scene, light=light)
 
 
+def _mixed(
+    rng: np.random.Generator, scene: Scene, camera: Calibration
+) -> tuple[Scene, str]:
+    """Return a scene with hard light or blur, clutter, and perhaps colours."""
+    scene, words = _cluttered(rng, scene, camera)
+    if rng.random() < 0.4:
+        scene, more = _coloured(rng, scene)
+        words += "; " + more
+    if rng.random() < 0.5:
+        return _hard_light(rng, scene), words + "; hard light"
+    scene, more = _blurred(rng, scene)
+    return scene, f"{words}; {more}"
+
+
 def _blurred(rng: np.random.Generator, scene: Scene) -> tuple[Scene, str]:
     light, words = scene.light, ("defocus", "motion", "grain", "gloss", "exposure")
     word = words[rng.integers(len(words))]
@@ -212,7 +230,7 @@ def _with(
     word: str, rng: np.random.Generator, scene: Scene, low: np.ndarray, high: np.ndarray
 ) -> Scene:
     if word == "magnet":
-        at, heading = _free_spot(rng, scene, low, high, 9.0)
+        at, heading = _free_spot(rng, scene, low, high, 7.0)
         pose = Pose(x_mm=at[0], y_mm=at[1], angle_deg=heading)
         block = Block(
             pose=pose, length_mm=8.0, width_mm=8.0, height_mm=8.0,
@@ -221,7 +239,7 @@ def _with(
         return replace(scene, blocks=(*scene.blocks, block))
     if word == "second rod":
         line = curve("arc", angle_deg=rng.uniform(-40.0, 40.0), length_mm=12.0)
-        at, heading = _free_spot(rng, scene, low, high, 7.0)
+        at, heading = _free_spot(rng, scene, low, high, 3.0)
         pose = Pose(x_mm=at[0], y_mm=at[1], angle_deg=heading, height_mm=0.6)
         other = Rod(line=line, pose=pose, side_mm=rng.uniform(0.5, 1.2))
         return replace(scene, others=(*scene.others, other))
@@ -285,11 +303,11 @@ def _clear_of_rod(
     scene: Scene, axis: int, low: float, high: float, rng: np.random.Generator,
     edge: float,
 ) -> float:  # fmt: skip
-    """Return a place along an axis that is 4 mm clear of the rod, else the edge."""
+    """Return a place along an axis that is 2.8 mm clear of the rod, else the edge."""
     held = _rod_points(scene)[:, axis]
     for _ in range(30):
         value = rng.uniform(low + 1.0, high - 1.0)
-        if value < held.min() - 4.0 or value > held.max() + 4.0:
+        if value < held.min() - 2.8 or value > held.max() + 2.8:
             return float(value)
     return float(edge)
 
