@@ -26,9 +26,10 @@ from magbend.vision import as_photo, extract, score
 from magbend.vision.synthetic.frames import frames
 
 STAGES = {
-    "binarise": "extract", "find_candidates": "extract", "start_curve": "extract",
-    "refine": "extract", "find_joints": "refine", "measurement": "extract",
-    "doubts": "extract",
+    "binarise": "find.choose", "find_candidates": "find.choose",
+    "start_curve": "extraction.extract", "refine": "extraction.extract",
+    "find_joints": "extraction.refine", "measurement": "extraction.extract",
+    "doubts": "extraction.extract",
 }  # fmt: skip
 """What is timed, and the module that calls it; joints are sought within `refine`, and
 count for themselves."""

@@ -34,6 +34,8 @@ curve; one that moves it by less is the last of them."""
 _STILL_PX, _ENDS_STILL_PX = 0.02, 0.15
 """By how much the curve and its ends may move when all is found; the ends are those of
 the curve as it is then."""
+_NEAR_STILL_PX = 0.08
+"""The first of them in a film, where time counts: what is left is a part of it."""
 _JOINTS_STILL_PX = 0.05
 """A curve that moves by less keeps its joints."""
 _BIN_PX = 4.0
@@ -135,6 +137,7 @@ def refine(
         near = False
         seen = _look(grey, state, sign, 0, seeking=True)
     seeking, before = not near, int(near)
+    still_px = _NEAR_STILL_PX if near else _STILL_PX
     tip, lines, first = find_ends(grey, state, seen, root, sign, 0, walls)
     places, aside, settled = None, np.inf, False
     for turn in range(before, _PASSES):
@@ -155,7 +158,7 @@ def refine(
         # The ends of the curve as it is now: often they move when it does not.
         tip, lines, first = find_ends(grey, state, seen, root, sign, turn + 1, walls)
         moved = abs(first) + abs(tip.s - state.last)
-        still = aside < _STILL_PX and moved < _ENDS_STILL_PX
+        still = aside < still_px and moved < _ENDS_STILL_PX
         settled = still and not seeking
         if settled:
             break
