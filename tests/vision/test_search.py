@@ -141,10 +141,13 @@ def test_a_specimen_tells_its_rod_from_another_in_a_clamp():
     assert found.length_mm == pytest.approx(26.0, abs=0.1)
 
 
-def test_a_rod_that_crosses_another_is_refused():
-    scene = replace(PLAIN, others=(lying(100.0, 4.0, -14.0, length_mm=24.0),))
-    found = measured(scene)
-    assert not found.ok or "tip_goes_on" in found.flags
+@pytest.mark.parametrize(
+    ("angle_deg", "x_mm", "y_mm"), [(100, 4, -14), (150, 14, -8), (60, -2, -12)]
+)
+def test_a_rod_that_crosses_another_is_refused(angle_deg, x_mm, y_mm):
+    found = measured(replace(PLAIN, others=(lying(angle_deg, x_mm, y_mm, 24.0),)))
+    assert not found.ok
+    assert not found.points
 
 
 def test_a_rod_that_leaves_the_picture_is_refused():

@@ -173,7 +173,7 @@ def finish(
     )  # fmt: skip
     if near and not refined.settled:
         raise LostError("edges_lost", "the rod moved too far since the last frame")
-    refusal(photo, refined, candidate)
+    refusal(view, refined, candidate)
     result = measurement(refined, view, setting)
     result = replace(result, inverted=view.sign < 0.0, mix=view.mix)
     return doubts(result, photo, view, refined, candidate, setting)

@@ -31,11 +31,14 @@ TIP_GOES_ON = "tip_goes_on"
 PALER_TIP = 0.12
 """Step to either side beyond the tip, over the rod's, that a shade does not have."""
 
+OVER_PAPER = 1.0
+"""Widths of bare paper under an axis that are more than a speck or a glint."""
+
 SHADE_PX = 0.04
 """Pull of a shade on the midline, before correction, above which it is named."""
 
 
-def refusal(photo: Photo, refined: Refined, candidate: Candidate) -> None:
+def refusal(view: View, refined: Refined, candidate: Candidate) -> None:
     """Refuse a refined rod that contradicts what was found at first.
 
     Raises
@@ -58,8 +61,30 @@ def refusal(photo: Photo, refined: Refined, candidate: Candidate) -> None:
         )
     if refined.fit.noise > 0.25 * width:
         raise LostError("inconsistent", "the edges of the rod lie on no smooth curve")
+    if _over_paper(view, refined) > OVER_PAPER * width:
+        raise LostError(
+            "inconsistent",
+            "the axis runs over bare paper for a while: two things may cross there",
+        )
     if length < 5.0 * width:
         raise LostError("no_rod", "what looks like a rod is shorter than five widths")
+
+
+def _over_paper(view: View, refined: Refined) -> float:
+    """Return how far the axis runs at a stretch over paper, without edges, px."""
+    if refined.rough or refined.good.all():
+        return 0.0  # a yarn has gaps
+    beside = 0.5 * refined.typical_width + 4.0
+    curve = refined.fit.curve
+    left, axis, right = lanes(
+        view.grey, curve, curve.s, np.array([-beside, 0.0, beside]), view.sign
+    )
+    rod = median(axis[refined.good])
+    paper = median(np.concatenate([left[refined.good], right[refined.good]]))
+    bare = ~refined.good & (axis > 0.5 * (rod + paper))
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], bare, [False]])))
+    runs = ends[1::2] - ends[::2]
+    return float(runs.max(initial=0) * (curve.s[1] - curve.s[0]))
 
 
 def doubts(
