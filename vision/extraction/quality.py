@@ -31,8 +31,8 @@ TIP_GOES_ON = "tip_goes_on"
 PALER_TIP = 0.12
 """Step to either side beyond the tip, over the rod's, that a shade does not have."""
 
-OVER_PAPER = 1.0
-"""Widths of bare paper under an axis that are more than a speck or a glint."""
+OVER_PAPER, BARE = 1.0, 0.6
+"""Widths of bare paper under an axis that are more than a speck, and its light."""
 
 SHADE_PX = 0.04
 """Pull of a shade on the midline, before correction, above which it is named."""
@@ -74,14 +74,13 @@ def _over_paper(view: View, refined: Refined) -> float:
     """Return how far the axis runs at a stretch over paper, without edges, px."""
     if refined.rough or refined.good.all():
         return 0.0  # a yarn has gaps
-    beside = 0.5 * refined.typical_width + 4.0
-    curve = refined.fit.curve
-    left, axis, right = lanes(
-        view.grey, curve, curve.s, np.array([-beside, 0.0, beside]), view.sign
-    )
-    rod = median(axis[refined.good])
-    paper = median(np.concatenate([left[refined.good], right[refined.good]]))
-    bare = ~refined.good & (axis > 0.5 * (rod + paper))
+    width, curve = refined.typical_width, refined.fit.curve
+    across = np.array([-0.5 * width - 4.0, -0.4 * width, 0.0, 0.4 * width])
+    beside, *inside = lanes(view.grey, curve, curve.s, across, view.sign)
+    rod, paper = median(inside[1][refined.good]), median(beside[refined.good])
+    # A glint is lighter than paper in the middle, but has dark rims.
+    darkest = np.min(inside, axis=0)
+    bare = ~refined.good & (darkest > rod + BARE * (paper - rod))
     ends = np.flatnonzero(np.diff(np.concatenate([[False], bare, [False]])))
     runs = ends[1::2] - ends[::2]
     return float(runs.max(initial=0) * (curve.s[1] - curve.s[0]))
