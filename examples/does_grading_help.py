@@ -27,6 +27,7 @@ from magbend.sim.navigate import (
     navigate,
     polyline,
 )
+from magbend.sim.navigate.curves import outline
 
 NOTHING = UniformField(flux_mT=0.0)
 FRICTION = 0.2
@@ -143,20 +144,17 @@ def outcome(task: str, passage: Passage, side_mm: float) -> Outcome:
     )
 
 
-def tried(rod: Specimen, friction: float = FRICTION) -> dict[str, Outcome]:
-    """Return how a rod does all tasks but the gap."""
-    limit_N = LIMIT * delivered_N(rod)
-    return {
-        task: outcome(
-            task,
-            navigate(
-                rod, lumen, NOTHING, friction=friction, push_limit_N=limit_N,
-                step_mm=0.25, refine=False,
-            ),
-            rod.side_mm,
-        )
-        for task, lumen in lumens(rod.side_mm).items()
-    }  # fmt: skip
+def through(rod: Specimen, task: str) -> Passage:
+    """Push a rod through the lumen of a task, up to what it can carry."""
+    return navigate(
+        rod, lumens(rod.side_mm)[task], NOTHING, friction=FRICTION, step_mm=0.25,
+        push_limit_N=LIMIT * delivered_N(rod), refine=False,
+    )  # fmt: skip
+
+
+def tried(rod: Specimen, tasks: tuple[str, ...] = TASKS) -> dict[str, Outcome]:
+    """Return how a rod does the tasks."""
+    return {task: outcome(task, through(rod, task), rod.side_mm) for task in tasks}
 
 
 def best_like(rod: Specimen, task: str) -> Specimen:
@@ -198,16 +196,36 @@ def best_like(rod: Specimen, task: str) -> Specimen:
     return made(found.x)
 
 
+def turn(ax: plt.Axes) -> None:
+    """Draw GMC 2 and the uniform rod in the turn, where the latter bows out most."""
+    task = "180 degrees"
+    for wall in lumens(gmc(2).side_mm)[task].walls:
+        ax.plot(*outline(wall.arcs).T, color="0.4", lw=1.2)
+    bowed = through(uniform_like(gmc(2)), task)
+    last_mm = bowed.steps[-1].insertion_mm
+    for name, passage, colour in (
+        ("GMC 2", through(gmc(2), task), "C0"),
+        ("uniform", bowed, "C3"),
+    ):
+        step = min(passage.steps, key=lambda s: abs(s.insertion_mm - last_mm))
+        label = f"{name}, {1e3 * step.push_N:.0f} mN"
+        ax.plot(*step.shape[:2], color=colour, lw=2.5, label=label)
+    ax.set_title(f"both pushed {last_mm:.0f} mm into a turn", fontsize=9)
+    ax.set_aspect("equal")
+    ax.legend(frameon=False, fontsize=8, loc="lower left")
+
+
 def main(folder: Path, numbers: tuple[int, ...] = (1, 2, 3, 4, 5, 6, 7)) -> dict:
     """Draw the figure; return the outcomes of graded and uniform rods."""
     found = {n: (tried(gmc(n)), tried(uniform_like(gmc(n)))) for n in numbers}
     gaps = {
         n: (delivered_N(gmc(n)), delivered_N(uniform_like(gmc(n)))) for n in numbers
     }
-    figure, axes = plt.subplots(1, 3, figsize=(9.6, 3.4), layout="constrained")
+    figure, axes = plt.subplots(2, 2, figsize=(8.6, 6.8), layout="constrained")
+    turn(axes[0, 0])
     names = ("push_mN", "root_per_mm", "wall_mN")
     titles = ("greatest push", "root curvature", "force on the walls")
-    for ax, name, title in zip(axes, names, titles, strict=True):
+    for ax, name, title in zip(axes.flat[1:], names, titles, strict=True):
         for k, task in enumerate(TASKS):
             ratio = [
                 getattr(graded[task], name) / getattr(plain[task], name)

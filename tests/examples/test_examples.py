@@ -117,3 +117,17 @@ def test_drivers_of_ones_own_are_tested_with_the_rig() -> None:
         assert example(module).__doc__
         texts = [path.read_text(encoding="utf-8") for path in rig.glob("test_*.py")]
         assert any(module in text for text in texts)
+
+
+def test_a_graded_rod_needs_less_push_round_a_bend() -> None:
+    module = example("does_grading_help")
+    graded = sim.gmc(2)
+    plain = module.uniform_like(graded)
+    assert module.tip_compliance(plain) == pytest.approx(module.tip_compliance(graded))
+    task = ("90 degrees",)
+    push_mN = [module.tried(rod, task)["90 degrees"].push_mN for rod in (graded, plain)]
+    assert push_mN[0] < 0.7 * push_mN[1]
+    # What it carries across a gap, its tip on a smooth wall, is Euler's column.
+    EI_Nmm2 = plain.sections[0].E_MPa * plain.side_mm**4 / 12.0
+    euler_N = 0.25 * np.pi**2 * EI_Nmm2 / plain.length_mm**2
+    assert module.delivered_N(plain) == pytest.approx(euler_N, rel=0.05)
