@@ -64,8 +64,8 @@ class Table:
         Raises
         ------
         ConfigError
-            If two columns answer to the name, or its head has no unit or one of
-            another kind.
+            If two columns answer to the name, or its head has no unit or an unknown
+            one.
         """
         exact = [i for i, head in enumerate(self.names) if head == name]
         if len(exact) == 1:
@@ -79,6 +79,8 @@ class Table:
             if own.casefold() != quantity.casefold():
                 continue
             factor = unit_factor(unit, wanted)
+            if factor is None and known_unit(unit):
+                continue  # x_px is another column than x_mm
             if factor is None:
                 what = f"in {unit!r}" if unit else "without a unit"
                 raise ConfigError(

@@ -43,7 +43,7 @@ def read_dxf(path: Path) -> list[RawShape]:
     unit = ""
     for (_, name), (code, value) in itertools.pairwise(pairs):
         if name == "$INSUNITS" and code == "70":
-            unit = _DXF_UNITS.get(int(value), "")
+            unit = _DXF_UNITS.get(int(parse_number(value) or 0), "")
     found = [points for points in _dxf_polylines(path, pairs) if len(points) >= 2]
     if not found:
         raise ConfigError(

@@ -31,6 +31,9 @@ DIRECTION_TOLERANCE_DEG = 6.0
 THETA_TOLERANCE_RAD = 0.03
 """Largest typical difference between a theta that is given and that of x and y."""
 
+REACH = 1e9
+"""Largest coordinate, in whatever unit."""
+
 POINTS = 121
 """Points that a shape is resampled to, where it brings no arc length of its own."""
 
@@ -146,6 +149,8 @@ def _in_mm(
             f"{raw.source}: a shape must have at least three finite points; instead "
             f"received {len(raw.points)}"
         )
+    if float(np.abs(raw.points).max()) > REACH:
+        raise InputError(f"{raw.source}: holds coordinates beyond {REACH:g}")
     unit = how.unit or raw.unit
     if unit in ("px", "pixel", "pixels"):
         if how.mm_per_px is None:

@@ -7,7 +7,9 @@ with or without a sweep side by side (``y (m) @ B0=0.05``), as text or CSV.
 from __future__ import annotations
 
 import contextlib
+import math
 import re
+import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +25,7 @@ from .shapes import KEPT, QUANTITIES, Array, Block, head_of
 
 LIMIT_MB = 64.0
 MAX_UNPACKED_MB = 512.0
+MAX_NUMBERS = 20_000_000
 
 
 def read_text_shapes(path: Path) -> list[Block]:
@@ -166,20 +169,27 @@ def read_matlab(path: Path) -> list[Block]:
 
 
 def _version5(path: Path) -> dict[str, Any]:
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
+    from scipy.io import loadmat, whosmat
 
     try:
-        content = loadmat(
-            path, simplify_cells=True, verify_compressed_data_integrity=True
-        )
-    except (MatReadError, NotImplementedError, ValueError, TypeError, OSError) as error:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            _check_size(path, sum(math.prod(shape) for _, shape, _ in whosmat(path)))
+            content = loadmat(
+                path, simplify_cells=True, verify_compressed_data_integrity=True
+            )
+    except ConfigError:
+        raise
+    except Exception as error:  # a damaged file makes the reader fail in any way
         raise ConfigError(
             f"{path}: is no MATLAB file that can be read: {error}"
         ) from None
-    except Exception as error:  # a damaged file makes the reader fail in any way
-        raise ConfigError(f"{path}: is a damaged MATLAB file: {error}") from None
     return {key: value for key, value in content.items() if not key.startswith("__")}
+
+
+def _check_size(path: Path, numbers: int) -> None:
+    if numbers > MAX_NUMBERS:
+        raise ConfigError(f"{path}: holds more than {MAX_NUMBERS} numbers; part it")
 
 
 def _hdf5(path: Path) -> dict[str, Any]:
@@ -195,7 +205,8 @@ def _hdf5(path: Path) -> dict[str, Any]:
                 continue
             if isinstance(item, h5py.Group):
                 found[name] = content(item)
-            elif item.dtype.kind in "fiu":
+            elif isinstance(item, h5py.Dataset) and item.dtype.kind in "fiu":
+                _check_size(path, int(item.size or 0))
                 found[name] = np.asarray(item, dtype=np.float64).T.squeeze()
         return found
 

@@ -15,7 +15,7 @@ from ...core.derived import note_derived
 from ...core.errors import MagbendError, StoreError
 from ...core.files import write_bytes, write_text
 from ...core.progress import Progress, silent
-from ..compare.compare import Comparison, RunComparison, models_of
+from ..compare.compare import IMPORTED, Comparison, RunComparison, models_of
 from ..figures.fit import fit_figure
 from ..figures.run import field_figure, residual_figure, shapes_figure, step_label
 from ..figures.several import paper_figure, summary_figure
@@ -119,6 +119,8 @@ def write_report(
         summary=_summary(runs, drawing) if len(runs) > 1 else None,
         paper=_paper(by_number, drawing),
         extra=extra_html,
+        origins=_origins(runs),
+        has_imported=all(run.of(IMPORTED) for run in runs),
         left_out=left_out,
         made_utc=datetime.now(UTC).isoformat(timespec="seconds"),
         version=_version(),
@@ -131,6 +133,20 @@ def write_report(
     used = [file for run in runs for file in run.run.files]
     note_derived([out, *pdfs], sources=used, command="analysis report")
     return ReportFiles(html=out, figures=pdfs)
+
+
+def _origins(runs: Sequence[RunComparison]) -> list[str]:
+    """Return what a reader must know first: which runs are no experiment here."""
+    twins = sum(bool(run.run.record.get("twin")) for run in runs)
+    imported = sum(bool(run.run.record.get("imported")) for run in runs)
+    sentences = []
+    if twins:
+        what = "This run" if len(runs) == 1 else f"{twins} of {len(runs)} runs"
+        sentences.append(f"{what}: a simulated bench (twin), no experiment.")
+    if imported:
+        what = "This run" if len(runs) == 1 else f"{imported} of {len(runs)} runs"
+        sentences.append(f"{what}: imported from a table, not recorded by this bench.")
+    return sentences
 
 
 def _title(runs: Sequence[RunComparison]) -> str:

@@ -208,6 +208,10 @@ REFUSED: dict[str, tuple[str, str, str]] = {
     "mathematica, deep": ("s.m", "{{{{{{0}}}}}}", "nested deeper"),
     "dxf with a spline": (
         "s.dxf", "0\nSECTION\n2\nENTITIES\n0\nSPLINE\n0\nEOF\n", "SPLINE; explode"),
+    "dxf with an odd unit": (
+        "s.dxf", dxf(2.0 * XY, 4).replace("\n70\n4\n", "\n70\n4%\n"), "60 long"),
+    "coordinates out of reach": (
+        "s.csv", text(XY * 1e290, "x_mm,y_mm"), "beyond 1e"),
     "svg under a transform": (
         "s.svg", svg(XY).replace("<polyline", '<g transform="scale(2)"><polyline')
         .replace("</svg>", "</g></svg>"), "transform"),

@@ -279,3 +279,26 @@ def browser(
         ],
         capture_output=True, text=True, timeout=120, check=True,
     )  # fmt: skip
+
+
+def test_a_report_says_at_once_that_its_bench_is_simulated(tmp_path: Path) -> None:
+    run = compare_run(load_run(write_run(tmp_path / "gmc2")))  # marked as a twin
+    page = write_report([run], tmp_path / "r.html").html.read_text()
+    head = page[page.index("<header>") : page.index("</header>")]
+    assert "a simulated bench (twin), no experiment" in head
+
+
+def test_tables_of_the_needed_columns_alone_make_a_report(tmp_path: Path) -> None:
+    """Pictures and pixels are gone; shapes and numbers stay (reports.md, case 23)."""
+    import pandas as pd
+
+    path = write_run(tmp_path / "gmc2")
+    for name, columns in (
+        ("frames.csv", ["image", "status"]),
+        ("centrelines.csv", ["image", "s_mm", "x_mm", "y_mm", "theta_rad"]),
+    ):
+        pd.read_csv(path / name)[columns].to_csv(path / name, index=False)
+    run = compare_run(load_run(path, unverified=True))
+    page = write_report([run], tmp_path / "r.html").html.read_text()
+    assert "no photograph in the run folder" in page
+    assert all(c.ok for c in run.of("magnet"))

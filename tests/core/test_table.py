@@ -77,7 +77,11 @@ REFUSED = {
     "foreign digits": ("x_mm,y_mm\n١,2\n".encode(), "line 2: x_mm must be"),
     "cut off": (b"x_mm,y_mm\n1,2\n3\n", "line 3: has 1 of the 2 values"),
     "no unit": (b"x,y\n1,2\n", "'x' is without a unit; head it x_mm"),
-    "another kind of unit": (b"x_s,y_mm\n1,2\n", "'x_s' is in 's'"),
+    "another kind of unit": (
+        b"x_s,y_mm\n1,2\n",
+        "must have the column.s. x_mm; .* x_s, y_mm",
+    ),
+    "an unknown unit": (b"x (furlong),y_mm\n1,2\n", "is in 'furlong'; head it x_mm"),
     "missing": (b"y_mm,z\n1,2\n", "must have the column.s. x_mm; .* y_mm, z"),
     "no heads": (b"1,2\n3,4\n", "first line must name the columns"),
     "heads alone": (b"x_mm,y_mm\n", "at least one row"),
