@@ -8,6 +8,7 @@ not lie on the axis; from there on the rod is measured as any other. It is flagg
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 
 import cv2
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 from ...core.errors import InputError, MagbendError
 from ..camera.calibrate import calibrate_known_length
 from ..camera.oriented import oriented
-from ..edge.state import LostError
+from ..edge.state import LostError, Root
 from ..find.ground import best_view
 from ..find.rod import Candidate
 from ..measurement import Measurement, failure
@@ -141,17 +142,17 @@ def _between(photo: Photo, setting: Setting, points: Array) -> Measurement:
     length = float(steps.sum())
     lost = LostError("no_rod", "there is no rod between the points")
     best: Measurement | None = None
-    for share in _WIDTHS:
+    for root, share in product(_roots(photo, points[0]), _WIDTHS):
         width = max(3.0, share * length)
         rod = Candidate(
-            points_px=path, width_px=width, length_px=length, root="clamp",
+            points_px=path, width_px=width, length_px=length, root=root,
             contacts=1, ratio=0.0,
         )  # fmt: skip
         view = best_view(photo, path, width)
         try:
             found = measure_candidate(photo, setting, rod, view)
         except LostError as error:
-            lost = error
+            lost = lost if lost.flag == "edges_lost" else error
             continue
         except BROKEN:
             continue
@@ -167,9 +168,19 @@ def _between(photo: Photo, setting: Setting, points: Array) -> Measurement:
     return best
 
 
+def _roots(photo: Photo, clamp: Array) -> tuple[Root, ...]:
+    """Return what the rod may grow from at the point given, likeliest first."""
+    width, height = photo.size_px
+    near = 0.02 * max(width, height)
+    x, y = clamp
+    if min(x, y, width - 1 - x, height - 1 - y) < near:
+        return ("border", "clamp")
+    return ("clamp", "free")
+
+
 def _same(found: Measurement, points: Array, width_px: float) -> bool:
     """Whether the measured rod ends where the person pointed."""
-    reach = 3.0 * width_px + 0.05 * float(np.hypot(*(points[-1] - points[0])))
+    reach = 3.0 * width_px + 0.02 * float(np.hypot(*(points[-1] - points[0])))
     ends = np.array([found.clamp_px, found.tip_px])
     away = np.hypot(*(ends - points[[0, -1]]).T)
     return bool(np.all(away < reach))
