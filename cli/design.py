@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..analysis import Reading
     from ..analysis.design.goals import Goal
     from ..analysis.design.makeable import Makeable
-    from ..analysis.design.search import Design
+    from ..analysis.design.search import Design, Task
     from ..core.specimen import Specimen
     from ..sim import Field
 
@@ -54,7 +54,12 @@ def design(
     tip_stiffness_N_mm: float | None = typer.Option(
         None, "--tip-stiffness-N-mm", help="With --lumen: of every rod, at its tip."
     ),
-    flux_mT: float | None = typer.Option(None, "--field-mT", help="Uniform field, mT."),
+    path: Path | None = typer.Option(
+        None, "--path", help="Tips in several fields: CSV with flux_mT,x_mm,y_mm."
+    ),
+    fluxes_mT: list[float] = typer.Option(
+        [], "--field-mT", help="Uniform field, mT; several fields go into --path."
+    ),
     field_angle_deg: float = typer.Option(
         90.0, "--field-angle-deg", help="Direction of the uniform field from +x."
     ),
@@ -108,6 +113,7 @@ def design(
         "unit_length_mm": _range(unit_length_mm, "--unit-length-mm"),
         "remanence_mT": remanence_mT,
     }
+    flux_mT = _one(fluxes_mT)
     for name, value in (
         ("flux_mT", flux_mT), ("gap_mm", gap_mm), ("remanence_mT", remanence_mT),
     ):  # fmt: skip
@@ -134,15 +140,20 @@ def design(
         return
     if figure is not None:
         model_figures.check_path(figure)
-    goal = _goal(
-        radius_mm, tip_mm, tip_angle_deg, curve, polyline, calibration, rod_height_mm,
-        Reading(unit=unit, flip=flip, align=align),
-    )  # fmt: skip
-    field = _field(flux_mT, field_angle_deg, magnet, gap_mm)
+    if path is not None:
+        given = (radius_mm, tip_mm, tip_angle_deg, curve, polyline, flux_mT, gap_mm)
+        tasks = _path(path, field_angle_deg, magnet, given)
+    else:
+        goal = _goal(
+            radius_mm, tip_mm, tip_angle_deg, curve, polyline, calibration,
+            rod_height_mm, Reading(unit=unit, flip=flip, align=align),
+        )  # fmt: skip
+        tasks = [(goal, _field(flux_mT, field_angle_deg, magnet, gap_mm))]
+    goal = tasks[0][0]
     limits = _makeable(makeable, options, recipes, recipe, goal)
     if out is not None:
         output_folder(out)
-    found = designing.design(goal, field, limits, count=count, seed=seed)
+    found = designing.design_all(tasks, limits, count=count, seed=seed)
     if figure is not None:
         drawing = model_figures.design_figure(found, goal)
         model_figures.save_figure(drawing, figure)
@@ -154,6 +165,31 @@ def design(
     _print(found, goal)
     if len(found) < count:
         typer.echo(f"only {len(found)} distinct designs were found", err=True)
+
+
+def _one(fluxes_mT: list[float]) -> float | None:
+    from ..core.errors import InputError
+
+    if len(fluxes_mT) > 1:
+        raise InputError(
+            f"--field-mT is one field; instead received {len(fluxes_mT)}: a table of "
+            "fields and the tips wanted in them goes into --path"
+        )
+    return fluxes_mT[0] if fluxes_mT else None
+
+
+def _path(
+    path: Path, angle_deg: float, magnet: Path | None, given: tuple[object, ...]
+) -> list[Task]:
+    from ..analysis.design.path import read_path
+    from ..core.errors import InputError
+    from ..core.specimen_file import read_magnet
+
+    if any(value is not None for value in given):
+        raise InputError("--path has its own goals and fields; give no other")
+    return read_path(
+        path, angle_deg=angle_deg, magnet=read_magnet(magnet) if magnet else None
+    )
 
 
 def _goal(
@@ -305,3 +341,9 @@ def _print(found: list[Design], goal: Goal) -> None:
             f"{rod.remanence_mT:g} mT{_mixed(rod)}: {one.achieved:.5g} {unit}, "
             f"error {one.error:.2g} {share}, tolerance {one.tolerance:.2g} {unit}"
         )
+        for other in one.more:
+            x_mm, y_mm = other.tip_mm
+            typer.echo(
+                f"   and ({x_mm:.4g}, {y_mm:.4g}) mm, error {other.error:.2g} mm, "
+                f"tolerance {other.tolerance:.2g} mm"
+            )

@@ -199,7 +199,7 @@ def nearby(problem: Problem, limits: Limits, begin: Array) -> Array:
                 break
             unknowns, before = unknowns + step, size
             if size < CLOSE:
-                return unknowns
+                return np.asarray(unknowns)
     return search(problem, limits, begin)
 
 

@@ -62,7 +62,8 @@ def contradiction() -> list[Finding]:
             return np.asarray((fluxes - model) / READING_SD_MT)
 
         found = least_squares(rows, [1.3, 0.0][: 1 + free])
-        sd = np.sqrt(np.diag(np.linalg.inv(found.jac.T @ found.jac)))
+        slopes = np.asarray(found.jac)
+        sd = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
         return found.x, sd, float(2.0 * found.cost)
 
     alone, _, chi2 = best(False, True)

@@ -127,7 +127,7 @@ def fit_law(rods: Rods) -> Law:
         if sign <= 0.0:
             return math.inf
         prior = float(np.sum(squares / (2.0 * SCATTER**2) - logs))
-        return 0.5 * (size + float(off @ np.linalg.solve(whole, off))) + prior
+        return 0.5 * float(size + off @ np.linalg.solve(whole, off)) + prior
 
     start = np.full(3, math.log(0.5 * SCATTER))
     found = minimize(cost, start, method="Nelder-Mead", options={"maxiter": 600})

@@ -20,7 +20,8 @@ from magbend.analysis.design.makeable import (
     rods,
     scattered,
 )
-from magbend.analysis.design.search import design
+from magbend.analysis.design.path import read_path
+from magbend.analysis.design.search import design, design_all
 from magbend.cli.main import app
 from magbend.core.errors import ConfigError, InputError, SolverError
 from magbend.core.magnet import Magnet
@@ -79,7 +80,9 @@ def test_designs_are_distinct_and_ranked():
                 or np.abs(np.log(E)).max() > 0.05
                 or abs(np.log(side)) > 0.02
             )
-    assert [one.tolerance for one in found] == sorted(one.tolerance for one in found)
+    # Told by rods that did not decide the rank, so that the first is not flattered.
+    tolerances = np.array([one.tolerance for one in found])
+    assert np.all(tolerances[1:] > 0.95 * tolerances[:-1])
 
 
 def test_the_tolerance_is_that_of_made_rods():
@@ -217,3 +220,61 @@ def test_wrong_usage_is_one_sentence(tmp_path):
         error = run(*arguments).exception
         assert isinstance(error, kind), (arguments, error)
         assert sentence in str(error)
+
+
+def test_the_first_of_several_is_not_flattered():
+    """Its tolerance is that of 20 000 rods nobody has seen."""
+    found = design(goals.radius_goal(100.0), FIELD, FREE, count=5)
+    many = scattered(
+        found[0].specimen, FREE.scatter, 20_000, np.random.default_rng(987)
+    )
+    shapes = solve_shapes(designs_in(many, FIELD)).points
+    made = goals.achieved(goals.radius_goal(1.0), shapes)
+    low, high = np.quantile(made[np.isfinite(made)], [0.025, 0.975])
+    assert found[0].tolerance == pytest.approx(0.5 * (high - low), rel=0.05)
+
+
+def test_a_path_of_tips_is_met_in_all_its_fields():
+    rod = gmc(2)
+    fields = [UniformField(flux_mT=flux) for flux in (30.0, 60.0)]
+    tips = [solve(rod, field).centreline.tip_mm for field in fields]
+    tasks = [
+        (goals.tip_goal(*tip), field) for tip, field in zip(tips, fields, strict=True)
+    ]
+    for one in design_all(tasks, FREE, count=2):
+        for tip, field in zip(tips, fields, strict=True):
+            reached = solve(one.specimen, field).centreline.tip_mm
+            assert np.hypot(*np.subtract(reached, tip)) < goals.HIT_MM
+        assert len(one.more) == 1
+        assert one.more[0].specimen == one.specimen
+    impossible = [tasks[0], (goals.tip_goal(29.0, -5.0), fields[1])]
+    with pytest.raises(SolverError, match=r"a tip at \(29, -5\)"):
+        design_all(impossible, FREE)
+
+
+def test_the_command_takes_a_path_and_refuses_half_of_one(tmp_path):
+    path = tmp_path / "path.csv"
+    path.write_text("flux_mT,x_mm,y_mm\n30,29.83,2.86\n60,29.35,5.55\n")
+    command = ["analysis", "design", "--path", str(path), "--count", "1", "--json"]
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 0
+    (one,) = json.loads(done.stdout)
+    assert one["error_mm"] < goals.HIT_MM
+    assert one["more"][0]["error_mm"] < goals.HIT_MM
+    for more, says in (
+        (["--field-mT", "50"], "no other"),
+        (["--radius-mm", "100"], "no other"),
+    ):
+        done = CliRunner().invoke(app, [*command, *more])
+        assert done.exit_code != 0
+        assert says in str(done.exception)
+    two = ["--radius-mm", "100", "--field-mT", "50", "--field-mT", "80"]
+    done = CliRunner().invoke(app, ["analysis", "design", *two])
+    assert "received 2" in str(done.exception)
+    path.write_text("flux_mT,x_mm,y_mm\n0,29.83,2.86\n")
+    with pytest.raises(InputError, match="must not be zero"):
+        read_path(path)
+    path.write_text("gap_mm,x_mm,y_mm\n60,29.83,2.86\n")
+    with pytest.raises(InputError, match="with --magnet"):
+        read_path(path)
+    assert len(read_path(path, magnet=Magnet.cube(55.0, 1.3))) == 1
