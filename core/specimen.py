@@ -253,6 +253,15 @@ class Specimen:
     @property
     def is_plain(self) -> bool:
         """Whether it is straight and magnetised along its axis."""
+        for part in (self, *self.sections):
+            if (
+                part.natural_curvature_per_mm
+                or part.remanence_y_mT
+                or part.remanence_z_mT
+            ):
+                break
+        else:
+            return True
         curved = any(self.natural_curvatures_per_mm)
         return not curved and not any(any(pair) for pair in self.transverse_mT)
 

@@ -275,16 +275,25 @@ def check_case(specimen: object, field: object, support: object) -> None:
         )
 
 
-def refuse_outside(field: Field, points_mm: NDArray[np.float64]) -> None:
+def refuse_outside(
+    field: Field,
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    unit_mm: float,
+    z: NDArray[np.float64] | None = None,
+) -> None:
     """Refuse a rod that leaves the box of a map: nobody measured there.
 
     Raises
     ------
     InputError
-        If one of its points, shape (n, 3), does.
+        If one of its points, in units of `unit_mm`, does.
     """
     if type(field) is not Field:
         return
+    if not any(source.kind == "map" for source in field.sources):
+        return
+    points_mm = np.column_stack([x, y, 0.0 * x if z is None else z]) * unit_mm
     for source in field.sources:
         holds = getattr(source, "holds", None)
         if holds is not None and not holds(points_mm):

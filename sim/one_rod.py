@@ -14,6 +14,7 @@ from ..core.errors import InputError
 from ..core.jit import plain_first
 from ..core.specimen import Specimen
 from ..core.units import mT_from_T, rad_from_deg
+from .ending import buckled_tips, ending
 from .fields import (
     PULLED_IN,
     STABLE,
@@ -27,12 +28,14 @@ from .fields import (
 from .planar.solver import GONE, ORDER, STEP, failure, solve_planar, solve_rows
 from .planar.swing import swing_index
 from .scaling import MOST_POINTS, field_array, rod_array, stations, stiffness_Nmm2
-from .solution import Ending, Solution
+from .solution import Solution
 
 Array = NDArray[np.float64]
 STATUS = (STABLE, UNSTABLE, PULLED_IN)
 NO_SUPPORT = Support()
-Case = tuple[Array, Array, float, float]
+Tips = tuple[tuple[float, float], ...]
+STRAIGHT = 1e-9
+"""Curvature, times the length, of a rod that counts as straight."""
 
 
 @plain_first(solve_rows)
@@ -106,26 +109,23 @@ def solve(
     rod, length_mm, margin, unit_Nm = _held(specimen, support)
     s = stations(points)
     flux = field_array(field, length_mm)
+    case = rod, flux, rad_from_deg(support.clamp_angle_deg), margin
     outcome, index, load, error, bx, by, moment, table, tip = solve_planar(
-        rod,
-        flux,
-        rad_from_deg(support.clamp_angle_deg),
-        margin,
-        s,
-        ORDER,
-        STEP,
+        *case, s, ORDER, STEP
     )
     if outcome > GONE:
         raise failure(outcome, specimen, field, load)
     centreline = stable_in_space = None
+    buckled: Tips = ()
     if outcome != GONE:
         x, y, theta, kappa = table
         centreline = Centreline._trusted(
             s * length_mm, x * length_mm, y * length_mm, theta, kappa / length_mm
         )
-        refuse_outside(field, np.column_stack([x, y, 0.0 * x]) * length_mm)
+        refuse_outside(field, x, y, length_mm)
+        if index > 0 and np.all(np.abs(kappa) < STRAIGHT):
+            buckled = buckled_tips(case, length_mm)
         stable_in_space = index == 0 and swing_index(rod, flux, tip, STEP) == 0
-    case = rod, flux, rad_from_deg(support.clamp_angle_deg), margin
     return Solution(
         centreline=centreline,
         status=STATUS[outcome],
@@ -135,26 +135,9 @@ def solve(
         root_moment_Nm=moment * unit_Nm,
         load_limit=load,
         stable_in_space=stable_in_space,
-        ending=_ending(case, load, length_mm) if outcome == GONE else None,
-        buckled_tips_mm=_buckled(case, centreline, index, length_mm),
+        ending=ending(case, load, length_mm) if outcome == GONE else None,
+        buckled_tips_mm=buckled,
     )
-
-
-def _ending(case: Case, load: float, length_mm: float) -> Ending | None:
-    from .ending import ending
-
-    return ending(case, load, length_mm)
-
-
-def _buckled(
-    case: Case, line: Centreline | None, index: int, length_mm: float
-) -> tuple[tuple[float, float], ...]:
-    """Return where a straight unstable rod buckles to; nowhere, if it is no such."""
-    if line is None or index <= 0 or np.any(np.abs(line.kappa_per_mm) > 1e-12):
-        return ()
-    from .ending import buckled_tips
-
-    return buckled_tips(case, length_mm)
 
 
 @lru_cache(maxsize=256)

@@ -223,7 +223,7 @@ def solve_solid(
         )  # fmt: skip
     _refuse_strain(held, load, moment)
     x, y, theta, kappa = table
-    refuse_outside(field, np.column_stack([x, y, 0.0 * x]) * L)
+    refuse_outside(field, x, y, L)
     centreline = Centreline._trusted(s * L, x * L, y * L, theta, kappa / L)
     return Solution(
         centreline=centreline,

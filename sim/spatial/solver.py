@@ -208,7 +208,8 @@ def solve_spatial(
 
         return _gone(flux, L, load_before_touching(load, clear), unloaded[-1])
     if not _is_vector(field):
-        refuse_outside(as_field(field), states[:, 12:15] * L)
+        x, y, z = states[:, 12:15].T
+        refuse_outside(as_field(field), x, y, L, z)
     return _solution(rod, table, flux, s, states, index, error)
 
 
