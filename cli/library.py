@@ -30,7 +30,11 @@ def build(
     scheduler: str | None = typer.Option(
         None,
         "--scheduler",
-        help="Dask scheduler, such as tcp://host:8786; workers must see --out.",
+        help="Dask scheduler, such as tcp://host:8786; workers must see --out. "
+        "Trusted networks only: who reaches it can run programs there (--tls).",
+    ),
+    tls: Path | None = typer.Option(
+        None, "--tls", help="Folder with ca.pem, cert.pem and key.pem for Dask."
     ),
     as_json: bool = JSON,
 ) -> None:
@@ -43,7 +47,7 @@ def build(
     what = read_space(space)
     kept = f"{out} keeps the finished partitions; the same command goes on from there"
     with progress("designs", kept=kept) as tell:
-        summary = builder.build(what, out, scheduler=scheduler, progress=tell)
+        summary = builder.build(what, out, scheduler=scheduler, tls=tls, progress=tell)
     if as_json:
         print_json(asdict(summary))
         return

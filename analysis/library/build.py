@@ -4,6 +4,7 @@ The folder explains itself:
 
     _library.json          the space, its digest, versions, columns; written first
     part-000000.parquet    designs 0 to partition_rows - 1, and so on
+    _digests.jsonl         the digest of each partition as it was written
 
 A partition is written beside, synced and renamed, so that it is whole or absent: a
 build that was killed goes on where it stopped and repeats none that is there.
@@ -11,6 +12,7 @@ build that was killed goes on where it stopped and repeats none that is there.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
 import platform
@@ -24,12 +26,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import MissingExtraError, StoreError
-from ...core.files import output_folder, write_bytes, write_text
+from ...core.checks import shown
+from ...core.errors import InputError, MissingExtraError, StoreError
+from ...core.files import write_bytes
+from ...core.json import read_json, write_json
+from ...core.owned import MARK, owning_folder
 from ...core.progress import Progress, silent
 from ...sim.batch import ROWS_PER_CALL, cores
 from ...sim.batch.shapes import STATUS, Designs, solve_shapes
 from ..shapes import descriptors
+from .ledger import SPACE_KEY, Ledger, is_sound
 from .space import Space
 
 Columns = dict[str, NDArray]
@@ -67,6 +73,7 @@ def build(
     out: Path,
     *,
     scheduler: str | None = None,
+    tls: Path | None = None,
     progress: Progress = silent,
 ) -> BuildSummary:
     """Solve a design space into the folder `out`, going on where a build stopped.
@@ -77,23 +84,38 @@ def build(
     out : Path
         A new folder, or the folder of an unfinished build of the same space.
     scheduler : str, optional
-        Address of a Dask scheduler whose workers see `out` under the same path.
+        Address of a Dask scheduler whose workers see `out` under the same path. Who
+        reaches it can run programs on the workers: on a trusted network only.
+    tls : Path, optional
+        Folder with ``ca.pem``, ``cert.pem`` and ``key.pem`` for that scheduler.
     progress : Progress
         Told in designs.
 
     Raises
     ------
     StoreError
-        If `out` holds something else, or the scheduler does not answer.
+        If `out` holds something else or a partition too many, another process builds
+        there, or the scheduler does not answer.
     MissingExtraError
         If pyarrow, or for a cluster distributed, is not installed.
     """
     require_pyarrow()
-    client = _connect(scheduler) if scheduler else None
-    try:
+    client = _connect(scheduler, tls) if scheduler else None
+    with contextlib.ExitStack() as opened:
+        if client is not None:
+            opened.callback(client.close)
+        opened.enter_context(
+            owning_folder(
+                out, "library", "analysis library build", ours=lambda path: (
+                    (path / MANIFEST).is_file() and bool(read_manifest(path))
+                ),
+            )
+        )  # fmt: skip
         _claim(space, out)
         total = partition_count(space)
-        good, damaged = _finished(space, out, total)
+        refuse_extra(out, total)
+        ledger = Ledger.read(out)
+        good, damaged = _finished(space, out, total, ledger)
         missing = [i for i in range(total) if i not in good]
         rows = [len(_range(space, i)) for i in range(total)]
         done = sum(rows[i] for i in good)
@@ -102,11 +124,9 @@ def build(
             space, out, missing
         )  # fmt: skip
         for index in run:
+            ledger.note(partition_path(out, index))
             done += rows[index]
             progress(done, space.size)
-    finally:
-        if client is not None:
-            client.close()
     return BuildSummary(
         designs=space.size,
         partitions=total,
@@ -144,10 +164,11 @@ def solve_partition(space: Space, out: Path, index: int) -> int:
     }
     codes = pa.array(columns.pop("status"), type=pa.int8())
     columns["status"] = pa.DictionaryArray.from_arrays(codes, list(STATUS))
+    table = pa.table(columns).replace_schema_metadata({SPACE_KEY: digest_of(space)})
     buffer = io.BytesIO()
     # LZ4 reads twice as fast as zstd here and is a sixth larger.
     pq.write_table(
-        pa.table(columns), buffer, compression="lz4", row_group_size=ROW_GROUP,
+        table, buffer, compression="lz4", row_group_size=ROW_GROUP,
         use_dictionary=_dictionaries(space), write_page_checksum=True,
         column_encoding={"design": "DELTA_BINARY_PACKED"},
     )  # fmt: skip
@@ -160,18 +181,7 @@ def describe_designs(designs: Designs, more: Sequence[str] = ()) -> Columns:
 
     `more` names descriptors of other packages (``magbend.descriptors``).
     """
-    columns: Columns = {}
-    for i in range(designs.length_mm.shape[1]):
-        columns[f"length{i + 1}_mm"] = designs.length_mm[:, i]
-    for i in range(designs.E_MPa.shape[1]):
-        columns[f"E{i + 1}_MPa"] = designs.E_MPa[:, i]
-    columns["side_mm"] = designs.side_mm
-    columns["remanence_mT"] = designs.remanence_mT
-    if designs.flux_mT is not None:
-        columns["angle_deg"] = designs.angle_deg
-        columns["flux_mT"] = designs.flux_mT
-    elif designs.gap_mm is not None:
-        columns["gap_mm"] = designs.gap_mm
+    columns = input_columns(designs)
     solved = solve_shapes(designs, points=POINTS)
     described = descriptors.describe(solved.points)
     for name, column in zip(descriptors.COLUMNS, described.T, strict=True):
@@ -185,6 +195,23 @@ def describe_designs(designs: Designs, more: Sequence[str] = ()) -> Columns:
         columns[f"y{percent}_mm"] = at[:, 2].astype(np.float32)
     columns["error_mm"] = solved.error_mm.astype(np.float32)
     columns["status"] = solved.status
+    return columns
+
+
+def input_columns(designs: Designs) -> Columns:
+    """Return the columns of a library that say what was solved."""
+    columns: Columns = {}
+    for i in range(designs.length_mm.shape[1]):
+        columns[f"length{i + 1}_mm"] = designs.length_mm[:, i]
+    for i in range(designs.E_MPa.shape[1]):
+        columns[f"E{i + 1}_MPa"] = designs.E_MPa[:, i]
+    columns["side_mm"] = designs.side_mm
+    columns["remanence_mT"] = designs.remanence_mT
+    if designs.flux_mT is not None:
+        columns["angle_deg"] = designs.angle_deg
+        columns["flux_mT"] = designs.flux_mT
+    elif designs.gap_mm is not None:
+        columns["gap_mm"] = designs.gap_mm
     return columns
 
 
@@ -213,19 +240,55 @@ def read_manifest(out: Path) -> dict[str, Any]:
         If there is none, or it is damaged.
     """
     path = out / MANIFEST
-    try:
-        manifest: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        if manifest["schema"] != SCHEMA:
-            raise ValueError(f"schema {manifest['schema']!r} is not known")
-        int(manifest["designs"]), int(manifest["partitions"]), manifest["digest"]
-    except (FileNotFoundError, NotADirectoryError):
+    if not path.exists():
         raise StoreError(
             f"{out}: is no prediction library ({MANIFEST} is missing); "
             "build one with `magbend analysis library build`"
-        ) from None
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        )
+    try:
+        manifest = read_json(path, kind=StoreError)
+        schema, space = manifest["schema"], manifest["space"]
+        if type(schema) is int and schema > SCHEMA:
+            raise StoreError(
+                f"{path}: was written by a newer magbend (format {schema}; this one "
+                f"reads up to {SCHEMA}); update magbend"
+            )
+        if schema != SCHEMA:
+            raise ValueError(f"schema {shown(schema)} is not known")
+        counts = [manifest["designs"], manifest["partitions"], space["partition_rows"]]
+        if not all(type(count) is int and count > 0 for count in counts):
+            raise ValueError("its counts are no positive numbers")
+        if manifest["digest"] != _digest(space):
+            raise ValueError("its space is not the one that was built")
+    except (ValueError, KeyError, TypeError) as error:
         raise StoreError(f"{path}: is damaged: {error}") from None
     return manifest
+
+
+def refuse_extra(out: Path, total: int) -> None:
+    """Refuse a library with partitions that are not of its space.
+
+    Raises
+    ------
+    StoreError
+        It names them.
+    """
+    wanted = {partition_path(out, index).name for index in range(total)}
+    extra = sorted({path.name for path in out.glob("part-*.parquet")} - wanted)
+    if extra:
+        raise StoreError(
+            f"{out}: holds {', '.join(extra[:4])}, which is no part of this library; "
+            f"take it out"
+        )
+
+
+def digest_of(space: Space) -> str:
+    """Return the digest that tells a space from every other."""
+    return _digest(space.model_dump(mode="json", exclude_none=True))
+
+
+def _digest(data: Any) -> str:
+    return hashlib.sha256(json.dumps(data, sort_keys=True).encode()).hexdigest()
 
 
 def _range(space: Space, index: int) -> range:
@@ -243,11 +306,10 @@ def _dictionaries(space: Space) -> list[str]:
 
 def _manifest(space: Space) -> dict[str, Any]:
     data = space.model_dump(mode="json", exclude_none=True)
-    text = json.dumps(data, sort_keys=True)
     return {
         "schema": SCHEMA,
         "name": space.name,
-        "digest": hashlib.sha256(text.encode()).hexdigest(),
+        "digest": _digest(data),
         "designs": space.size,
         "partitions": partition_count(space),
         "space": data,
@@ -279,20 +341,30 @@ def _claim(space: Space, out: Path) -> None:
         for stale in out.glob(".part-*.tmp"):
             stale.unlink()
         return
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+    if any(entry.name != MARK for entry in out.iterdir()):
         raise StoreError(f"{out}: exists and is no library; give a new --out folder")
-    output_folder(out)
-    write_text(out / MANIFEST, json.dumps(manifest, indent=2) + "\n")
+    write_json(out / MANIFEST, manifest)
 
 
-def _finished(space: Space, out: Path, total: int) -> tuple[set[int], list[str]]:
+def _finished(
+    space: Space, out: Path, total: int, ledger: Ledger
+) -> tuple[set[int], list[str]]:
     """Return which partitions are there and whole, and the names of damaged ones."""
     good, damaged = set(), []
+    digest = digest_of(space)
     for index in range(total):
-        if _is_whole(space, out, index):
+        path = partition_path(out, index)
+        if not path.exists():
+            continue
+        if ledger.holds(path):
             good.add(index)
-        elif partition_path(out, index).exists():
-            damaged.append(partition_path(out, index).name)
+        elif path.name in ledger.digests:
+            damaged.append(path.name)
+        elif is_sound(space, digest, path, _range(space, index)):
+            ledger.note(path)  # of a build that was cut off, or of before the ledger
+            good.add(index)
+        else:
+            damaged.append(path.name)
     return good, damaged
 
 
@@ -308,7 +380,7 @@ def _here(space: Space, out: Path, missing: list[int]) -> Iterator[int]:
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _connect(address: str) -> Any:
+def _connect(address: str, tls: Path | None) -> Any:
     try:
         from distributed import Client
     except ImportError:
@@ -319,13 +391,30 @@ def _connect(address: str) -> Any:
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
-        return Client(address, timeout=5, set_as_default=False)
+        return Client(address, timeout=5, set_as_default=False, security=_security(tls))
     except (OSError, ValueError, TimeoutError) as error:
         reason = " ".join(str(error).split())[:160] or type(error).__name__
         raise StoreError(
             f"--scheduler {address}: no Dask scheduler answers there ({reason}); "
             "start one with `dask scheduler` or leave the option out"
         ) from None
+
+
+def _security(tls: Path | None) -> Any:
+    """Return what Dask encrypts and proves itself with; None for a trusted network."""
+    if tls is None:
+        return None
+    from distributed import Security
+
+    for name in ("ca.pem", "cert.pem", "key.pem"):
+        if not (tls / name).is_file():
+            raise InputError(f"--tls: {tls / name} is missing")
+    return Security(
+        tls_ca_file=str(tls / "ca.pem"),
+        tls_client_cert=str(tls / "cert.pem"),
+        tls_client_key=str(tls / "key.pem"),
+        require_encryption=True,
+    )
 
 
 def _on_cluster(
@@ -348,19 +437,5 @@ def _on_cluster(
 
 
 def _task(index: int, *, data: dict[str, Any], out: str) -> int:
-    """Solve a partition on a worker, unless it is there."""
-    space, folder = Space.model_validate(data), Path(out)
-    if _is_whole(space, folder, index):
-        return index
-    return solve_partition(space, folder, index)
-
-
-def _is_whole(space: Space, out: Path, index: int) -> bool:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        rows = pq.read_metadata(partition_path(out, index)).num_rows
-    except (pa.ArrowException, OSError):
-        return False
-    return bool(rows == len(_range(space, index)))
+    """Solve a partition on a worker."""
+    return solve_partition(Space.model_validate(data), Path(out), index)

@@ -28,9 +28,11 @@ from .build import (
     STATIONS,
     partition_path,
     read_manifest,
+    refuse_extra,
     require_pyarrow,
 )
 from .conditions import all_of, parse_range, parse_where
+from .ledger import SPACE_KEY
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -186,6 +188,8 @@ def open_library(library: Path) -> tuple[Any, dict[str, Any], int]:
     parts = sorted(str(path) for path in library.glob("part-*.parquet"))
     if not parts:
         raise StoreError(f"{library}: holds no finished partition yet; build it first")
+    refuse_extra(library, int(manifest["partitions"]))
+    _refuse_foreign(library, parts, manifest["digest"])
     options = ds.ParquetFragmentScanOptions(page_checksum_verification=True)
     form = ds.ParquetFileFormat(default_fragment_scan_options=options)
     try:
@@ -193,6 +197,25 @@ def open_library(library: Path) -> tuple[Any, dict[str, Any], int]:
     except (pa.ArrowException, OSError):
         raise StoreError(_damaged(library, parts)) from None
     return data, manifest, int(manifest["partitions"]) - len(parts)
+
+
+def _refuse_foreign(library: Path, parts: Sequence[str], digest: str) -> None:
+    """Refuse partitions of another space; those of before say nothing about theirs."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    for part in parts:
+        if not Path(part).is_file():
+            raise StoreError(f"{part}: is no file")
+        try:
+            noted = (pq.read_schema(part).metadata or {}).get(SPACE_KEY)
+        except (pa.ArrowException, OSError):
+            continue  # named with all that are damaged
+        if noted is not None and noted.decode("ascii", "replace") != digest:
+            raise StoreError(
+                f"{library}: {Path(part).name} is of another space; delete it and "
+                f"build the library again: only what is missing is solved"
+            )
 
 
 @contextlib.contextmanager

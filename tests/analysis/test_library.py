@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -18,16 +19,19 @@ from typer.testing import CliRunner
 
 from magbend.analysis.compare.metrics import circularity, fit_circle, quadratic_fit
 from magbend.analysis.library.build import (
+    MANIFEST,
     build,
     partition_count,
     partition_path,
     read_manifest,
 )
+from magbend.analysis.library.ledger import Ledger
 from magbend.analysis.library.query import query, write_rows
 from magbend.analysis.library.space import Space, read_space
 from magbend.analysis.shapes.feasible import falling_moduli, fitting_lengths
 from magbend.cli.main import app
 from magbend.core.errors import ConfigError, InputError, StoreError
+from magbend.core.owned import MARK
 from magbend.core.specimen import Section, Specimen
 from magbend.sim import UniformField, gmc, solve
 
@@ -198,10 +202,13 @@ def test_rows_are_what_the_solver_and_the_metrics_say(table):
 
 def test_a_finished_build_repeats_nothing(library):
     space = read_space(library.parent / "space.toml")
-    before = {p.name: p.stat().st_mtime_ns for p in library.iterdir()}
+    before = {p.name: p.stat().st_mtime_ns for p in library.glob("*.*")}
     summary = build(space, library)
     assert summary.solved_partitions == 0
-    assert {p.name: p.stat().st_mtime_ns for p in library.iterdir()} == before
+    after = {p.name: p.stat().st_mtime_ns for p in library.glob("*.*")}
+    assert {name: after[name] for name in before if name != MARK} == {
+        name: time for name, time in before.items() if name != MARK
+    }
 
 
 def test_a_damaged_partition_is_solved_again(tmp_path):
@@ -230,13 +237,107 @@ def test_a_flipped_byte_is_noticed(tmp_path):
         query(tmp_path / "out", top=1000)
 
 
+def test_a_bit_anywhere_of_a_partition_is_noticed_and_it_is_solved_again(tmp_path):
+    space = read_space(write_space(tmp_path, designs=2048))
+    out = tmp_path / "out"
+    build(space, out)
+    generator = np.random.default_rng(3)
+    for turn in range(6):
+        victim = partition_path(out, turn % 2)
+        good = victim.read_bytes()
+        flipped = bytearray(good)
+        flipped[int(generator.integers(len(good)))] ^= 1 << int(generator.integers(8))
+        victim.write_bytes(flipped)
+        summary = build(space, out)
+        assert summary.repaired == (victim.name,)
+        assert victim.read_bytes() == good
+
+
+def test_a_partition_of_another_space_is_not_taken(tmp_path):
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    first = read_space(write_space(tmp_path / "a", designs=1024))
+    path = write_space(tmp_path / "b", designs=1024)
+    path.write_text(path.read_text().replace('name = "', 'name = "other '))
+    second = read_space(path)
+    build(first, tmp_path / "one")
+    build(second, tmp_path / "two")
+    foreign = partition_path(tmp_path / "two", 0).read_bytes()
+    victim = partition_path(tmp_path / "one", 0)
+    good = victim.read_bytes()
+    victim.write_bytes(foreign)
+    with pytest.raises(StoreError, match=r"part-000000\.parquet is of another space"):
+        query(tmp_path / "one", where="tip_y_mm > -1")
+    for ledger in (True, False):
+        victim.write_bytes(foreign)
+        if not ledger:
+            (tmp_path / "one" / "_digests.jsonl").unlink()
+        assert build(first, tmp_path / "one").repaired == (victim.name,)
+        assert victim.read_bytes() == good
+
+
+def test_a_partition_too_many_is_named_and_nothing_counts_below_zero(tmp_path):
+    space = read_space(write_space(tmp_path, designs=1024))
+    build(space, tmp_path / "out")
+    extra = partition_path(tmp_path / "out", 7)
+    extra.write_bytes(partition_path(tmp_path / "out", 0).read_bytes())
+    for act in (
+        lambda: build(space, tmp_path / "out"),
+        lambda: query(tmp_path / "out"),
+    ):
+        with pytest.raises(StoreError, match=r"part-000007\.parquet, which is no part"):
+            act()
+
+
+def test_partitions_of_before_the_ledger_are_read_whole_and_kept(tmp_path):
+    space = read_space(write_space(tmp_path, designs=2048))
+    out = tmp_path / "out"
+    build(space, out)
+    (out / "_digests.jsonl").unlink()
+    assert build(space, out).solved_partitions == 0
+    assert len(Ledger.read(out).digests) == 2
+
+
+def test_a_second_builder_is_told_who_builds(tmp_path):
+    space = read_space(write_space(tmp_path, designs=1024))
+    told = []
+
+    def other():
+        with pytest.raises(StoreError) as caught:
+            build(space, tmp_path / "out")
+        told.append(str(caught.value))
+
+    def progress(_done, _total):
+        if not told:
+            thread = threading.Thread(target=other)
+            thread.start()
+            thread.join()
+
+    build(space, tmp_path / "out", progress=progress)
+    assert "is being written by magbend analysis library build, process" in told[0]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"schema": 99}, {"schema": "1"}, {"designs": -3}, {"partitions": 0},
+        {"space": {}}, {"space": None}, {"digest": "0" * 64}, {"designs": None},
+    ],
+)  # fmt: skip
+def test_a_manifest_of_another_kind_is_a_sentence(change, library, tmp_path):
+    data = json.loads((library / MANIFEST).read_text())
+    (tmp_path / MANIFEST).write_text(json.dumps({**data, **change}))
+    with pytest.raises(StoreError, match=r"damaged|newer magbend"):
+        read_manifest(tmp_path)
+
+
 def test_another_space_or_folder_is_not_overwritten(library, tmp_path):
     other = read_space(write_space(tmp_path, designs=2000))
     with pytest.raises(StoreError, match="another space"):
         build(other, library)
     (tmp_path / "notes").mkdir()
     (tmp_path / "notes" / "mine.txt").write_text("keep")
-    with pytest.raises(StoreError, match="is no library"):
+    with pytest.raises(StoreError, match="was not made by magbend"):
         build(other, tmp_path / "notes")
 
 
