@@ -80,8 +80,8 @@ def _controls(panel: Panel, caller: Caller, name: str, arguments: Arguments) -> 
 
 def _stop(panel: Panel, _arguments: Arguments) -> Outcome:
     """Stop whatever moves: the run, else the stage."""
-    if panel.supervisor.facts is not None:
-        return {"text": panel.supervisor.ask("stop")}
+    if panel.supervisor.is_running:
+        return {"text": panel.supervisor.stop()}
     panel.owner.request_stop()
     return {"text": "stopping"}
 

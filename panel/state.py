@@ -33,6 +33,7 @@ def _files(panel: Panel) -> dict[str, Any]:
         "has_rig_file": panel.workspace.rig_path.exists(),
         "rig": rig.name if rig else None,
         "twin": panel.is_twin,
+        "meter": rig.meter.driver if rig else None,
         "specimen": {
             "name": specimen.name,
             "length_mm": specimen.length_mm,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
+from ...core.checks import finite
 from ...core.errors import ConfigError, InputError
 from ..arguments import Arguments, Outcome
 from ..workspace import now_name, require
@@ -39,6 +40,7 @@ def start_run(panel: Panel, arguments: Arguments) -> Outcome:
     if panel.is_twin:
         speed = TWIN_SPEED * panel.twin.speed
         command += ["--seed", str(panel.twin.seed), "--speed", f"{speed:g}"]
+    command += _assumed(panel)
     command += _readings(arguments, len(plan.gaps_mm))
     panel.owner.release()
     panel.sight.forget()
@@ -51,14 +53,22 @@ def _new_folder(panel: Panel, plan: Any) -> Any:
     return panel.workspace.runs_path / f"{now_name()}_{name}"
 
 
+def _assumed(panel: Panel) -> list[str]:
+    """Return the word for where the stage stands, where no switch tells it."""
+    rig, gap_mm = panel.workspace.files().rig, panel.owner.gap_mm
+    if rig is None or rig.stage.homing != "manual" or gap_mm is None:
+        return []
+    return ["--assume-gap-mm", f"{gap_mm:.3f}"]
+
+
 def _readings(arguments: Arguments, count: int) -> list[str]:
     """Return the option for readings of a hand meter, one a gap."""
     values = arguments.get("flux_mT")
     if not values:
         return []
-    is_list = isinstance(values, list) and len(values) == count
-    if not is_list or not all(isinstance(value, (int, float)) for value in values):
+    if not isinstance(values, list) or len(values) != count:
         raise InputError(f"flux_mT must be {count} numbers in mT, one a gap")
+    values = [finite(value, "flux_mT", "mT") for value in values]
     return ["--flux-mT", ",".join(f"{value:g}" for value in values)]
 
 
@@ -74,7 +84,7 @@ def resume_run(panel: Panel, _arguments: Arguments) -> Outcome:
 
 def abort_run(panel: Panel, _arguments: Arguments) -> Outcome:
     """Stop the run: the stage is held, and its ending written."""
-    return {"text": panel.supervisor.ask("stop")}
+    return {"text": panel.supervisor.stop()}
 
 
 def start_job(panel: Panel, arguments: Arguments) -> Outcome:

@@ -39,7 +39,12 @@ def list_runs(workspace: Workspace) -> list[dict[str, Any]]:
 
     rows = []
     for folder in _folders(workspace):
-        row: dict[str, Any] = {"name": folder.name, "has": derived(folder)}
+        fit = _fit(folder) or {}
+        row: dict[str, Any] = {
+            "name": folder.name,
+            "has": derived(folder),
+            "verdict": fit.get("verdict"),
+        }
         try:
             run = read_run(folder)
         except MagbendError as error:
@@ -145,7 +150,7 @@ def _fit(folder: Path) -> dict[str, Any] | None:
     except (OSError, ValueError):
         return None
     keys = (
-        "E_MPa", "E_sd_MPa", "chi2_reduced", "not_identifiable", "model", "steps",
-        "degenerate_directions",
+        "verdict", "p_value", "reasons", "E_MPa", "E_sd_MPa", "chi2_reduced",
+        "not_identifiable", "model", "steps", "degenerate_directions",
     )  # fmt: skip
     return {key: data.get(key) for key in keys} if isinstance(data, dict) else None

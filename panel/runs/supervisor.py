@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import subprocess
 import threading
 import time
 import urllib.request
@@ -48,6 +49,7 @@ class Supervisor:
         self._thread = threading.Thread(target=self._work, name="run", daemon=True)
         self._facts: dict[str, Any] | None = None
         self._starting_s = 0.0
+        self._process: subprocess.Popen[bytes] | None = None
         self._number = 0
         self._seen_s = 0.0
         self.last_run = ""
@@ -98,7 +100,7 @@ class Supervisor:
         self.last_run = folder.name
         with self.log.open("ab") as output:
             process = start(arguments, self._workspace.folder, output, detached=True)
-        self._starting_s = time.monotonic()
+        self._starting_s, self._process = time.monotonic(), process
         threading.Thread(
             target=self._reap, args=(process,), name="run end", daemon=True
         ).start()
@@ -118,6 +120,26 @@ class Supervisor:
         answer = ask(self._workspace.rig_path, what, port=self._port())
         self._look_now.set()
         return str(answer.get("text", ""))
+
+    def stop(self) -> str:
+        """Stop the run, also one that has not said a word yet, or answers no more.
+
+        Raises
+        ------
+        RigError
+            If there is no run, or it cannot be reached in any way.
+        """
+        process, facts = self._process, self._facts
+        if facts is None and process is not None and process.poll() is None:
+            process.terminate()
+            return "the run was told to end before it began"
+        try:
+            return self.ask("stop")
+        except RigError:
+            if process is None or process.poll() is not None:
+                raise
+            process.terminate()  # it holds the stage at this signal too
+            return "the run did not answer and was sent SIGTERM"
 
     def picture(self) -> Picture | None:
         """Return what the run's camera sees, from its live view.

@@ -42,6 +42,8 @@ function planCard() {
     samples: h("input", {type: "number", min: 1, max: 10000}),
     abort: h("select", {}, h("option", {value: "hold"}, "stay where it is"), h("option", {value: "retract"}, "retract from the magnet")),
   };
+  const readings = h("input", {type: "text", inputmode: "decimal"});
+  const byHand = h("div", {hidden: true}, field("Readings of the hand meter, mT, one a gap", readings, "left empty, the run has no field readings"));
   const problem = h("p", {class: "doubt", role: "alert"});
   const total = h("p", {class: "facts"});
   const plot = s("svg", {class: "plot", role: "img", "aria-label": "predicted shape at each gap"});
@@ -52,12 +54,12 @@ function planCard() {
     field("Name", inputs.name), field("Operator", inputs.operator),
     field("Gaps, mm, from far to near", inputs.gaps_mm, "with commas between them; or from:to:step, such as 90:50:-5"),
     h("div", {class: "row"}, field("Settle at least, s", inputs.settle_s), field("Pictures a step", inputs.frames), field("Field readings", inputs.samples)),
-    field("If it is aborted", inputs.abort));
+    field("If it is aborted", inputs.abort), byHand);
   const element = h("section", {class: "card", "aria-label": "Plan"},
     h("h2", {}, "Plan"), form, problem, h("h3", {}, "What it should show"), plot,
     h("div", {class: "wide"}, h("table", {}, h("thead", {}, h("tr", {}, ["Step", "Gap, mm", "Flux, mT", "Time, s", "State"].map((name) => h("th", {scope: "col"}, name)))), rows)), total,
     h("div", {class: "row"}, start, save));
-  return {element, inputs, problem, total, plot, rows, start, save};
+  return {element, inputs, readings, byHand, problem, total, plot, rows, start, save};
 }
 
 async function load() {
@@ -119,7 +121,8 @@ async function savePlan() {
 
 async function startRun() {
   if (await savePlan()) {
-    const answer = await act("run-start");
+    const read = view.plan.byHand.hidden ? [] : view.plan.readings.value.split(/[;\s]+|,\s+/).filter(Boolean).map(typed);
+    const answer = await act("run-start", {flux_mT: read});
     if (answer) detailKey = "";
   }
 }
@@ -159,6 +162,7 @@ function resultCard() {
 export function render(state) {
   view.live.render(state);
   const {run} = state;
+  view.plan.byHand.hidden = state.files.meter !== "manual";
   const {going, result} = view;
   const facts = run.facts;
   going.element.hidden = !facts && !run.starting;
@@ -223,9 +227,9 @@ export function afterButtons(name, found) {
 
 function fitTable(fit) {
   const known = (fit.E_MPa ?? []).map((value, index) => h("tr", {}, h("th", {scope: "row"}, `section ${index + 1}`), h("td", {}, value === null ? "not identifiable" : `${num(value, 2)} ± ${num(fit.E_sd_MPa[index], 2)} MPa`)));
-  const chi2 = fit.chi2_reduced;
-  const verdict = chi2 === null ? "" : chi2 < 2 ? "The model explains the photographs." : "More is left over than the photographs' errors explain: the deviations are widened for it.";
-  return [h("h3", {}, "Fitted moduli"), h("table", {}, h("tbody", {}, known)), h("p", {class: "facts"}, `χ² over degrees of freedom ${num(chi2, 2)}. ${verdict} ${(fit.degenerate_directions ?? []).join(" ")}`)];
+  const verdict = h("span", {class: `chip ${{supported: "good", doubtful: "warn", contradicted: "bad"}[fit.verdict] ?? ""}`}, fit.verdict ?? "no verdict");
+  return [h("h3", {}, "Fitted moduli ", verdict), h("table", {}, h("tbody", {}, known)), (fit.reasons ?? []).map((reason) => h("p", {class: "doubt"}, reason)),
+    h("p", {class: "facts"}, `χ² over degrees of freedom ${num(fit.chi2_reduced, 2)}, p ${num(fit.p_value, 3)}. ${(fit.degenerate_directions ?? []).join(" ")}`)];
 }
 
 /** The jobs, each with its command, its progress and what it said. */

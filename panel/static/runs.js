@@ -22,7 +22,7 @@ export function make(root) {
   const buttons = [several("compare", "Compare"), several("fit", "Fit together"), several("report", "Report of all"), several("package", "Package for a paper")];
   fill(root, h("div", {class: "columns"},
     h("div", {class: "card"}, h("div", {class: "row spread"}, h("h1", {}, "Runs"), h("div", {class: "row", role: "group", "aria-label": "With the chosen runs"}, buttons)), none,
-      h("div", {class: "wide"}, h("table", {class: "runs"}, h("thead", {}, h("tr", {}, ["Choose", "Run", "State", "Steps", "Doubts", "Done so far"].map((name) => h("th", {scope: "col"}, name)))), rows))),
+      h("div", {class: "wide"}, h("table", {class: "runs"}, h("thead", {}, h("tr", {}, ["Choose", "Run", "State", "Steps", "Doubts", "Done so far", "Fit"].map((name) => h("th", {scope: "col"}, name)))), rows))),
     h("div", {class: "stack"}, h("section", {class: "card", "aria-label": "One run"}, detail), h("section", {class: "card", "aria-label": "Work"}, h("h2", {}, "Work"), jobs))));
   view = {rows, none, jobs, detail, buttons};
 }
@@ -61,7 +61,7 @@ function line(run) {
   return h("tr", {}, h("td", {}, box),
     h("th", {scope: "row"}, h("button", {type: "button", class: "quiet", onclick: () => show(run.name)}, run.name), run.twin ? h("span", {class: "chip"}, "twin") : null),
     h("td", {}, h("span", {class: `chip ${KINDS[run.status] ?? ""}`}, run.status), run.problem ? h("p", {class: "doubt"}, run.problem) : null),
-    h("td", {}, run.planned === undefined ? "–" : `${run.steps} of ${run.planned}`), h("td", {}, run.flags ? String(run.flags) : "none"), h("td", {}, run.has.join(", ") || "–"));
+    h("td", {}, run.planned === undefined ? "–" : `${run.steps} of ${run.planned}`), h("td", {}, run.flags ? String(run.flags) : "none"), h("td", {}, run.has.join(", ") || "–"), h("td", {}, run.verdict ?? "–"));
 }
 
 function choose() {

@@ -67,6 +67,16 @@ def test_a_run_is_paused_aborted_and_resumed(panel: Served, bench: Path) -> None
     assert small[1].startswith(b"\xff\xd8")
 
 
+def test_a_stop_reaches_a_run_that_has_not_said_a_word(panel: Served) -> None:
+    panel.command("take", over=True)
+    name = panel.command("run-start")["run"]
+    assert panel.panel.supervisor.facts is None
+    assert "before it began" in panel.command("stop", client="watcher")["text"]
+    wait_for(lambda: not panel.panel.supervisor.is_running)
+    assert not panel.panel.workspace.runs_path.joinpath(name, "images").exists()
+    wait_for(lambda: panel.panel.owner.parts is not None)
+
+
 def test_a_run_outlives_the_panel_and_is_found_again(tmp_path: Path) -> None:
     from magbend.panel import prepare_demo
 
