@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from magbend.panel import Address, Panel, Twin, Workspace, serve
+from magbend.panel import Address, Panel, Twin, Workspace, hub, serve
 
 SPEED = 6.0
+hub.SMOOTH_S = 0.25  # four pictures a second are enough for a test, and cheap
 
 
 @dataclass(frozen=True)

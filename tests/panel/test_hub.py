@@ -82,7 +82,7 @@ def test_a_page_gets_the_next_picture_when_it_has_shown_the_last(panel: Served) 
         socket.send('{"picture": true, "awake": true}')
         first = picture(socket)
         with pytest.raises(TimeoutError):
-            picture(socket, timeout=0.5)  # it has not said that it has shown it
+            picture(socket, timeout=0.6)  # it has not said that it has shown it
         socket.send(json.dumps({"shown": first["number"]}))
         assert picture(socket)["number"] > first["number"]
 

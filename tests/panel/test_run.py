@@ -31,10 +31,17 @@ def facts_of(panel: Served) -> dict[str, Any]:
     return dict(panel.panel.supervisor.facts or {})
 
 
+def start(panel: Served) -> str:
+    """Start a run and return its name."""
+    wait_for(lambda: not panel.panel.supervisor.is_running)
+    answer = panel.command("run-start")
+    assert answer["ok"], answer
+    return str(answer["run"])
+
+
 def test_a_run_is_paused_aborted_and_resumed(panel: Served, bench: Path) -> None:
     panel.command("take", over=True)
-    started = panel.command("run-start")
-    name = started["run"]
+    name = start(panel)
     wait_for(lambda: facts_of(panel).get("state") in ("moving", "settling"))
     pid = facts_of(panel)["pid"]
     assert pid != os.getpid()
@@ -69,7 +76,7 @@ def test_a_run_is_paused_aborted_and_resumed(panel: Served, bench: Path) -> None
 
 def test_a_stop_reaches_a_run_that_has_not_said_a_word(panel: Served) -> None:
     panel.command("take", over=True)
-    name = panel.command("run-start")["run"]
+    name = start(panel)
     assert panel.panel.supervisor.facts is None
     assert "before it began" in panel.command("stop", client="watcher")["text"]
     wait_for(lambda: not panel.panel.supervisor.is_running)
@@ -82,7 +89,7 @@ def test_a_run_outlives_the_panel_and_is_found_again(tmp_path: Path) -> None:
 
     rig = prepare_demo(tmp_path / "bench", seed=2)
     with served(rig) as first:
-        name = first.command("run-start")["run"]
+        name = start(first)
         pid = wait_for(lambda: facts_of(first).get("pid"))
     os.kill(pid, 0)  # the panel is gone; the run is not
     with served(rig) as second:
@@ -95,7 +102,7 @@ def test_a_run_outlives_the_panel_and_is_found_again(tmp_path: Path) -> None:
 
 def test_a_run_that_is_killed_can_be_resumed(panel: Served) -> None:
     panel.command("take", over=True)
-    name = panel.command("run-start")["run"]
+    name = start(panel)
     pid = wait_for(lambda: facts_of(panel).get("pid"))
     wait_for(lambda: facts_of(panel).get("state") in ("moving", "settling"))
     os.kill(pid, signal.SIGKILL)
