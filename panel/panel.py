@@ -59,6 +59,7 @@ class Panel:
         self.jobs = Jobs(workspace, self.hub.changed)
         self.direction: Literal[1, -1] | None = None
         self._number = 0
+        self._seen: Parts | None = None
         self._after_s = 0.0
         self._last: Any = None
         self._pose: Any = None
@@ -120,6 +121,8 @@ class Panel:
         return self._grab_here(parts)
 
     def _grab_here(self, parts: Parts) -> Picture:
+        if parts is not self._seen:  # opened anew, with a clock of its own
+            self._seen, self._after_s = parts, 0.0
         frame = parts.camera.grab_after(self._after_s)
         self._after_s = frame.arrival_s
         self._number += 1

@@ -73,9 +73,10 @@ function draw(screen) {
   const width = (newest.size?.[0] ?? live.width) / box.width;
   for (const [x, y] of screen.marks) dot(pen, x, y, width);
   if (!drawn || screen.plain) return;
+  // The dashed predictions lie over the measured line, so that both show where they agree.
+  if (screen.shown.measured && drawn.measured_px?.length) stroke(pen, drawn.measured_px, COLOURS.measured, [], width, 2.5, true);
   for (const [name, shape] of Object.entries(drawn.predicted ?? {}))
     if (screen.shown[name] && shape.px) stroke(pen, shape.px, COLOURS[name], DASHES[name], width, 2.5);
-  if (screen.shown.measured && drawn.measured_px?.length) stroke(pen, drawn.measured_px, COLOURS.measured, [], width, 2);
 }
 
 function dot(pen, x, y, width) {
@@ -88,14 +89,16 @@ function dot(pen, x, y, width) {
   pen.stroke();
 }
 
-function stroke(pen, points, colour, dash, width, weight) {
+function stroke(pen, points, colour, dash, width, weight, cased = false) {
   const path = new Path2D();
   points.forEach(([x, y], index) => (index ? path.lineTo(x, y) : path.moveTo(x, y)));
   pen.lineJoin = pen.lineCap = "round";
-  pen.setLineDash([]);
-  pen.strokeStyle = "rgba(0,0,0,.55)";
-  pen.lineWidth = (weight + 2) * width;
-  pen.stroke(path);
+  if (cased) {
+    pen.setLineDash([]);
+    pen.strokeStyle = "rgba(0,0,0,.55)";
+    pen.lineWidth = (weight + 2) * width;
+    pen.stroke(path);
+  }
   pen.setLineDash(dash.map((part) => part * width));
   pen.strokeStyle = colour;
   pen.lineWidth = weight * width;

@@ -87,6 +87,18 @@ def test_a_page_gets_the_next_picture_when_it_has_shown_the_last(panel: Served) 
         assert picture(socket)["number"] > first["number"]
 
 
+def test_pictures_come_again_after_the_bench_was_opened_anew(panel: Served) -> None:
+    with pages(panel, 1) as (socket,):
+        socket.send('{"picture": true, "awake": true}')
+        before = picture(socket)["number"]
+        panel.command("take", over=True)
+        assert panel.command("connect")["ok"]
+        socket.send(json.dumps({"shown": before}))
+        assert picture(socket)["number"] > before
+        socket.send(json.dumps({"shown": before + 1}))
+        assert picture(socket)["number"] > before + 1
+
+
 def picture(socket: Any, timeout: float = 10.0) -> dict[str, Any]:
     deadline = time.monotonic() + timeout
     while (left := deadline - time.monotonic()) > 0.0:
