@@ -33,6 +33,8 @@ class Panel:
 
     Attributes
     ----------
+    handing_over : Lock
+        Held while the bench is taken, or given to a run: never both at once.
     direction : {1, -1} or None
         Which way somebody saw the stage go, in this sitting's test of the direction.
     """
@@ -57,6 +59,7 @@ class Panel:
         self.supervisor = Supervisor(workspace, self.hub.changed)
         self.supervisor.over = self.connect
         self.jobs = Jobs(workspace, self.hub.changed)
+        self.handing_over = threading.Lock()
         self.direction: Literal[1, -1] | None = None
         self._number = 0
         self._seen: Parts | None = None
@@ -76,8 +79,10 @@ class Panel:
 
     def connect(self) -> None:
         """Open the bench, unless there is no rig file or a run has it."""
-        if self.workspace.files().rig is not None and not self.supervisor.is_running:
-            self.owner.open()
+        with self.handing_over:
+            has_rig = self.workspace.files().rig is not None
+            if has_rig and not self.supervisor.is_running:
+                self.owner.open()
 
     def close(self) -> None:
         """Hold and let go of the bench; a run goes on in its own process."""

@@ -42,9 +42,11 @@ def start_run(panel: Panel, arguments: Arguments) -> Outcome:
         command += ["--seed", str(panel.twin.seed), "--speed", f"{speed:g}"]
     command += _assumed(panel)
     command += _readings(arguments, len(plan.gaps_mm))
-    panel.owner.release()
-    panel.sight.forget()
-    panel.supervisor.start(command, folder)
+    with panel.handing_over:
+        panel.require_free()
+        panel.owner.release()
+        panel.sight.forget()
+        panel.supervisor.start(command, folder)
     return {"text": f"run {folder.name} started", "run": folder.name}
 
 
