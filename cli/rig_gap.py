@@ -77,7 +77,7 @@ def _was_tested(table: Any) -> bool:
     return table.measured is not None and table.measured.direction_tested
 
 
-def _sign(number: int) -> Literal[1, -1]:
+def _sign(number: float) -> Literal[1, -1]:
     return 1 if number > 0 else -1
 
 
@@ -91,25 +91,39 @@ def _require_room(gap_mm: float, min_gap_mm: float) -> None:
 
 def _test_direction(stage: GapStage, gap_mm: float) -> tuple[Literal[1, -1], float]:
     """Move by 1 mm and back; return which way it went, and the gap gauged after."""
+    from ..rig import InterlockError
+
     with answering():
         typer.echo(
             "The stage now moves by 1 mm, slowly, and back: see which way it goes.",
             err=True,
         )
         typer.prompt("Enter: go on", default="", show_default=False, err=True)
-        stage.nudge(_TEST_MM)
+        way_mm = _test_way_mm(stage)
+        stage.nudge(way_mm)
         answer = ""
         while answer not in ("f", "n"):
             answer = typer.prompt(
                 "Is the rod now farther from the magnet (f) or nearer (n)?", err=True
             ).strip()[:1].lower()  # fmt: skip
-        sign = _sign(1 if answer == "f" else -1)
-        stage.nudge(-_TEST_MM)
-        if sign < 0:  # end with a motion toward the magnet, as every approach does
-            stage.nudge(-_TAKE_UP_MM)
-            stage.nudge(_TAKE_UP_MM)
+        stage.nudge(-way_mm)
+        play = "with the play taken up"
+        if answer == "n":  # end with a motion toward the magnet, as every approach does
+            try:
+                stage.nudge(-_TAKE_UP_MM * way_mm)
+                stage.nudge(_TAKE_UP_MM * way_mm)
+            except InterlockError:
+                play = "at the end of its travel, so that the play was not taken up"
         again = typer.prompt(
-            "It is back, with the play taken up. Gauge the gap again, in mm",
+            f"It is back, {play}. Gauge the gap again, in mm",
             default=gap_mm, type=float, err=True,
         )  # fmt: skip
-    return sign, float(again)
+    return _sign(way_mm if answer == "f" else -way_mm), float(again)
+
+
+def _test_way_mm(stage: GapStage) -> float:
+    """Return which way there is room for the test: up, unless the travel ends there."""
+    travel, here_mm = stage.limits.travel_mm, stage.status().stage_mm
+    if travel is None or here_mm is None or here_mm + _TEST_MM <= travel[1]:
+        return _TEST_MM
+    return -_TEST_MM

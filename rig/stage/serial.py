@@ -344,12 +344,13 @@ class SerialStage(ABC, Generic[Session]):
             self._is_under_way = False
 
     def nudge(self, distance_mm: float) -> None:
-        """Go a short way slowly, from wherever the stage is; nothing is checked.
+        """Go a short way slowly, from wherever the stage is.
 
         Raises
         ------
         InterlockError
-            If it is more than `NUDGE_MM`; nothing was sent.
+            If it is more than `NUDGE_MM`, or a homed stage would leave its travel;
+            nothing was sent.
         StageError
             If the board moves already, is locked, or the way did not end as it should.
         """
@@ -360,6 +361,8 @@ class SerialStage(ABC, Generic[Session]):
                 f"at a time; instead received {distance_mm:g} mm; nothing was sent"
             )
         here = self._standing_mm()
+        if self._trust.state == "homed":
+            self._check_travel(here + distance_mm)
         self._is_under_way = True
         try:
             with self._stand_if_interrupted():

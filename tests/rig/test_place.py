@@ -267,3 +267,13 @@ def test_verify_finds_the_mixed_maps_of_older_runs(make_bench, tmp_path):
     assert "step 1: stage_mm = -69.5 is a gap of 80.5 mm by the map, not 60 mm" in (
         problems
     )
+
+
+def test_a_homed_stage_is_not_nudged_into_its_switch():
+    bench = Bench({20: 1, 21: 1, 22: 1}, homing="switches", gap_at_zero_mm=None)
+    stage = bench.command()
+    stage.home()
+    with pytest.raises(InterlockError, match=r"-180 to -1 mm.*nothing was sent"):
+        stage.nudge(1.0)
+    stage.nudge(-1.0)
+    assert stage.status().state == "idle"

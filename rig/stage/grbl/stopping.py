@@ -249,7 +249,8 @@ def reset_motion(
         )
     place = machine[axis] if machine and len(machine) > axis else None
     alarm = session.alarm  # 3, if it moved
-    is_kept = was_standing if alarm is None else alarm_text(alarm).position_kept
+    stood = was_standing or watch.is_stuck  # nothing moved: no step was lost
+    is_kept = stood if alarm is None else alarm_text(alarm).position_kept
     first = watch.first_mm
     return StopProof(
         means="nothing" if was_standing else "reset",
