@@ -116,6 +116,15 @@ def swallow(rig: Rig) -> None:
     rig.board.lose_input(3.0)
 
 
+def ignored_stop(rig: Rig) -> None:
+    rig.board.heeds_stops = False
+    rig.devices.stage.request_stop()
+
+
+def lose_an_answer(rig: Rig) -> None:
+    rig.board.lose_output(0.9)
+
+
 CELLS: dict[str, tuple[Callable[[Rig], object], str, str]] = {
     "timeout: board silent": (in_move(silent), "fail", "silent"),
     "timeout: motor stalls": (
@@ -138,7 +147,12 @@ CELLS: dict[str, tuple[Callable[[Rig], object], str, str]] = {
     "Ctrl-C in motion": (in_move(interrupt), "abort", "operator"),
     "Ctrl-C standing": (standing(interrupt), "abort", "operator"),
     "stop from another terminal": (
-        in_move(lambda r: r.devices.stage.request_stop()), "abort", "stop"),
+        in_move(lambda r: r.devices.stage.request_stop()), "abort",
+        "by jog cancel.*position was kept"),
+    "stop that the board ignores": (
+        in_move(ignored_stop), "abort", "by reset.*position is unverified"),
+    "one answer missing": (in_move(lose_an_answer), "success", "every"),
+    "one answer missing standing": (standing(lose_an_answer), "success", "every"),
 }  # fmt: skip
 
 
@@ -147,6 +161,7 @@ def mend_and_resume(rig: Rig, out: Path) -> None:
     before = read_run(out).steps
     rig.board.plant.stuck = False
     rig.board.mover.stalled = False
+    rig.board.heeds_stops = True
     rig.board.plugged = True
     rig.board.lose_output(0.0)
     rig.camera.clear()
