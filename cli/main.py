@@ -8,6 +8,7 @@ import sys
 import typer
 
 from ..core.errors import MagbendError
+from ..core.text import printable
 from . import analysis, bench, migrate, panel, rig, sim, vision
 
 app = typer.Typer(
@@ -102,7 +103,7 @@ def _say_interrupted(end: BaseException | None) -> None:
 def _stop(error: Exception, sentence: str) -> None:
     if os.environ.get("MAGBEND_DEBUG"):
         raise error
-    typer.echo(f"magbend: {' '.join(sentence.split())}", err=True)
+    typer.echo(printable(f"magbend: {' '.join(sentence.split())}"), err=True)
     sys.exit(1)
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..core.errors import InputError, StoreError
+from ..core.text import printable
 from .console import print_json, progress
 from .rig_bench import asks_flux, needs_twin, open_bench
 from .rig_flux import require_plausible
@@ -142,9 +143,9 @@ def verify(
         )
     else:
         for problem in check.problems:
-            typer.echo(problem)
+            typer.echo(printable(problem))
         for warning in record.warnings if record else ():
-            typer.echo(f"{run}: {warning}", err=True)
+            typer.echo(printable(f"{run}: {warning}"), err=True)
         if record and not check.problems:
             typer.echo(
                 f"{run}: good, {len(record.steps)} steps, {record.status}, "

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import json
 import re
 import tomllib
 from pathlib import Path
@@ -18,8 +17,13 @@ from pydantic import (
     field_validator,
 )
 
+from .checks import shown
+from .door import read_file
 from .errors import ConfigError
+from .json import parse_json
 from .slips import slip_of
+
+_MOST_MB = 2.0
 
 Location = tuple[int | str, ...]
 Model = TypeVar("Model", bound="FileModel")
@@ -69,14 +73,26 @@ def read_toml(path: Path, model: type[Model]) -> Model:
     text = read_text(path)
     is_json = text.lstrip().startswith("{")
     try:
-        data = json.loads(text) if is_json else tomllib.loads(text)
+        data = parse_json(text.encode()) if is_json else _parse_toml(text)
     except (ValueError, RecursionError) as error:
         kind = "JSON" if is_json else "TOML"
-        raise ConfigError(f"{path}: is not valid {kind}: {error}") from None
+        raise ConfigError(f"{path}: is not valid {kind}: {_short(error)}") from None
     try:
         return model.model_validate(data)
     except ValidationError as error:
         raise ConfigError(_sentence(path, text, error, model)) from None
+
+
+def _parse_toml(text: str) -> dict[str, Any]:
+    """Return what a TOML text holds; names of a thousand dots would take all memory."""
+    if re.search(r"(?:[\w\"'-]{1,99}\s*\.\s*){60}", text):
+        raise ValueError("it is nested too deep")
+    return tomllib.loads(text)
+
+
+def _short(error: Exception) -> str:
+    text = str(error)
+    return text if len(text) < 300 else f"{text[:200]} ..."
 
 
 def read_text(path: Path) -> str:
@@ -88,15 +104,9 @@ def read_text(path: Path) -> str:
         If it is missing, a folder, unreadable, or not UTF-8.
     """
     try:
-        return path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise ConfigError(f"{path}: there is no such file") from None
-    except IsADirectoryError:
-        raise ConfigError(f"{path}: is a folder, not a file") from None
+        return read_file(path, _MOST_MB).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise ConfigError(f"{path}: is not a text file (UTF-8)") from None
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
 
 
 def line_of(text: str, location: Location) -> int | None:
@@ -171,7 +181,7 @@ def _sentence(
         )
     message = first["msg"].removeprefix("Value error, ")
     message = message[0].lower() + message[1:]
-    return f"{where}: {key}: {message}; instead received {first['input']!r}"
+    return f"{where}: {key}: {message}; instead received {shown(first['input'])}"
 
 
 def _suggestion(location: Location, model: type[BaseModel]) -> str:

@@ -23,6 +23,7 @@ from ...core.files import write_text
 from ...core.magnet import Magnet
 from ...core.notebook import Tabular, axes_or_new, plot_line
 from ...core.specimen import Specimen
+from ...core.text import defused
 from ..runs.load import Frame, RunData, Step
 from . import metrics
 
@@ -464,7 +465,8 @@ def comparison_table(runs: Iterable[RunComparison]) -> pd.DataFrame:
 def write_comparison(path: Path, runs: Iterable[RunComparison]) -> None:
     """Write ``comparison.csv``, whole or not at all; empty cells where no number is."""
     runs = list(runs)
-    write_text(path, comparison_table(runs).to_csv(index=False, lineterminator="\n"))
+    table = comparison_table(runs).map(defused)
+    write_text(path, table.to_csv(index=False, lineterminator="\n"))
     used = [file for run in runs for file in run.run.files]
     note_derived([path], sources=used, command="analysis compare")
 

@@ -7,13 +7,18 @@ import json
 import zlib
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
+from zipfile import BadZipFile, ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.door import MEGABYTE, read_file
 from ...core.errors import StoreError
 from ...core.files import write_bytes
+from ...core.json import parse_json
+
+_MOST_MB = 256.0
+_MOST_ARRAYS = 500
 
 DAMAGE = (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile, zlib.error)
 """What reading a damaged file may raise."""
@@ -37,16 +42,18 @@ def read_model(path: Path) -> tuple[dict[str, NDArray], dict[str, Any]]:
     OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile, zlib.error
         If it is damaged (`DAMAGE`).
     """
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
-        raise StoreError(f"{path}: there is no such model file") from None
+    content = read_file(path, _MOST_MB, StoreError)
+    with ZipFile(io.BytesIO(content)) as entries:
+        if sum(entry.file_size for entry in entries.infolist()) > _MOST_MB * MEGABYTE:
+            raise ValueError("it unpacks to more than any model")
+        if len(entries.infolist()) > _MOST_ARRAYS:
+            raise ValueError("it holds more arrays than any model")
     with np.load(io.BytesIO(content), allow_pickle=False) as archive:
         arrays = {name: archive[name] for name in archive.files}
     for name, array in arrays.items():
         if not np.all(np.isfinite(array)):
             raise ValueError(f"{name} holds numbers that are not finite")
-    return arrays, json.loads(arrays.pop("card").tobytes())
+    return arrays, parse_json(arrays.pop("card").tobytes())
 
 
 def damaged(path: Path, what: str, error: Exception, way_out: str) -> StoreError:

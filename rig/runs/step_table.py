@@ -6,6 +6,7 @@ import csv
 import io
 from collections.abc import Sequence
 
+from ...core.text import defused
 from .records import Record
 
 COLUMNS = (
@@ -23,7 +24,8 @@ def step_table(steps: Sequence[Record]) -> str:
         settle = step.get("settle", {})
         files = step.get("files") or [{}]
         writer.writerow(
-            [
+            defused(cell)
+            for cell in (
                 step["index"],
                 step.get("gap_mm"),
                 step.get("stage_mm"),
@@ -36,6 +38,6 @@ def step_table(steps: Sequence[Record]) -> str:
                 " ".join(step.get("flags", [])),
                 files[0].get("path"),
                 step.get("time_utc"),
-            ]
+            )
         )
     return buffer.getvalue()
