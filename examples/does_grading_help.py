@@ -212,7 +212,7 @@ def turn(ax: plt.Axes) -> None:
         ax.plot(*step.shape[:2], color=colour, lw=2.5, label=label)
     ax.set_title(f"both pushed {last_mm:.0f} mm into a turn", fontsize=9)
     ax.set_aspect("equal")
-    ax.legend(frameon=False, fontsize=8, loc="lower left")
+    ax.legend(frameon=False, fontsize=8, loc="center left")
 
 
 def main(folder: Path, numbers: tuple[int, ...] = (1, 2, 3, 4, 5, 6, 7)) -> dict:

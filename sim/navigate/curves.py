@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.errors import InputError
+
 Array = NDArray[np.float64]
 Point = tuple[float, float]
 
@@ -110,6 +112,11 @@ def spline(points_mm: Sequence[Point], *, closed: bool = False) -> tuple[Arc, ..
 
     Two arcs that meet in a common tangent join the spline's points and tangents
     (Bolton 1975), on ever finer spans until they are within 1e-4 mm of the spline.
+
+    Raises
+    ------
+    InputError
+        If the spline comes to a stop, as where its points turn straight back.
     """
     from scipy.interpolate import CubicSpline
 
@@ -120,17 +127,22 @@ def spline(points_mm: Sequence[Point], *, closed: bool = False) -> tuple[Arc, ..
     arcs: tuple[Arc, ...] = ()
     for cuts in (2, 4, 8, 16, 32):
         at = np.concatenate(
-            [np.linspace(a, b, cuts, endpoint=False) for a, b in _pairs(knots)]
+            [
+                np.linspace(a, b, cuts, endpoint=False)
+                for a, b in itertools.pairwise(knots)
+            ]
             + [knots[-1:]]
         )
-        arcs = _biarcs(curve(at), curve(at, 1))
+        velocity = curve(at, 1)
+        if np.hypot(*velocity.T).min() < 1e-6:
+            raise InputError(
+                "the points of a spline must not turn straight back; instead it comes "
+                f"to a stop near {tuple(np.round(curve(at), 3)[len(at) // 2])} mm"
+            )
+        arcs = _biarcs(curve(at), velocity)
         if _off(arcs, curve, at) < SPLINE_ERROR_MM:
             break
     return arcs
-
-
-def _pairs(values: Array) -> zip[tuple[float, float]]:
-    return itertools.pairwise(values)
 
 
 def _biarcs(points: Array, velocities: Array) -> tuple[Arc, ...]:

@@ -23,7 +23,7 @@ APART = 0.25
 @njit(**PART)
 def lonely(t, piece, s, apart, but):  # type: ignore[no-untyped-def]
     """Return whether no contact but `but` is on the same piece within `apart`."""
-    for k in range(t.count[0]):
+    for k in range(t.used[0]):
         if k != but and t.piece[k] == piece and abs(t.s[k] - s) < apart:
             return False
     return True
@@ -33,7 +33,7 @@ def lonely(t, piece, s, apart, but):  # type: ignore[no-untyped-def]
 def prune(t, keep):  # type: ignore[no-untyped-def]
     """Drop contacts without force and clear of the wall; return how many."""
     n = 0
-    for k in range(t.count[0]):
+    for k in range(t.used[0]):
         if t.force[k] == 0.0 and t.gap[k] > keep:
             continue
         t.piece[n] = t.piece[k]
@@ -52,8 +52,8 @@ def prune(t, keep):  # type: ignore[no-untyped-def]
         t.y[n] = t.y[k]
         t.way[n] = t.way[k]
         n += 1
-    dropped = t.count[0] - n
-    t.count[0] = n
+    dropped = t.used[0] - n
+    t.used[0] = n
     return dropped
 
 
@@ -123,7 +123,7 @@ def join(t, piece, s, h):  # type: ignore[no-untyped-def]
     """Make two contacts near `s` one that floats; return 1 if there were just two."""
     a = b = -1
     n = 0
-    for k in range(t.count[0]):
+    for k in range(t.used[0]):
         if t.piece[k] == piece and t.kind[k] == FIXED and abs(t.s[k] - s) < h:
             n += 1
             a, b = b, k
@@ -144,7 +144,7 @@ def seat(t, piece, s, h, length, kind):  # type: ignore[no-untyped-def]
     """Put a contact at `s` unless one is near; return 1 if anything changed."""
     is_tip = s > length - 1e-9
     best = -1
-    for k in range(t.count[0]):
+    for k in range(t.used[0]):
         alike = t.piece[k] == piece and (t.kind[k] == TIP) == is_tip
         if alike and (best < 0 or abs(t.s[k] - s) < abs(t.s[best] - s)):
             best = k
@@ -156,10 +156,10 @@ def seat(t, piece, s, h, length, kind):  # type: ignore[no-untyped-def]
 @njit(**PART)
 def add_touch(t, piece, s, kind):  # type: ignore[no-untyped-def]
     """Add a contact without force, if there is room for one; return 1 if so."""
-    if t.count[0] == MOST:
+    if t.used[0] == MOST:
         return 0
-    k = t.count[0]
-    t.count[0] += 1
+    k = t.used[0]
+    t.used[0] += 1
     t.piece[k] = piece
     t.s[k] = s
     t.force[k] = 0.0
@@ -178,7 +178,7 @@ def sort_kinds(rod, u, bent, walls, half, t, h, free):  # type: ignore[no-untype
     Two contacts, `APART` from each other, hold a rod that lies flat between them.
     """
     locate(rod, u, bent, walls, half, t)
-    for k in range(t.count[0]):
+    for k in range(t.used[0]):
         if t.kind[k] == TIP:
             continue
         if not free and t.kind[k] == FIXED:
@@ -199,7 +199,7 @@ def sort_kinds(rod, u, bent, walls, half, t, h, free):  # type: ignore[no-untype
             t.kind[k] = FIXED
             t.s[k] = s - half_apart
             t.force[k] *= 0.5
-            t.force[t.count[0] - 1] = t.force[k]
+            t.force[t.used[0] - 1] = t.force[k]
         else:
             t.kind[k] = FLOATS
             t.home[k] = s
@@ -210,7 +210,7 @@ def sort_kinds(rod, u, bent, walls, half, t, h, free):  # type: ignore[no-untype
 def strayed(rod, t):  # type: ignore[no-untyped-def]
     """Return how many floating contacts are as far from home as they may be."""
     n = 0
-    for k in range(t.count[0]):
+    for k in range(t.used[0]):
         far = abs(t.s[k] - t.home[k]) > 0.999 * t.room[k]
         if t.kind[k] == FLOATS and t.force[k] > 0.0 and far:
             n += 1

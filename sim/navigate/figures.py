@@ -13,7 +13,6 @@ from .lumen import Lumen
 from .passage import Passage, Step
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
 FRAMES = 80
@@ -86,7 +85,7 @@ def film(path: Path, lumen: Lumen, passage: Passage, *, side_mm: float) -> None:
 
     steps = passage.steps[:: max(1, -(-len(passage.steps) // FRAMES))]
     figure = Figure(figsize=(5.6, 4.2), dpi=80, layout="constrained")
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)
     axes = figure.add_subplot()
     _lumen(axes, lumen, passage)
     title = axes.set_title(" ", fontsize=9)
@@ -129,11 +128,11 @@ def _lumen(axes: Axes, lumen: Lumen, passage: Passage) -> None:
     axes.set_ylabel("y in mm")
 
 
-def _rod(axes: Axes, step: Step, side_mm: float) -> list[Artist]:
+def _rod(axes: Axes, step: Step, side_mm: float) -> list[Any]:
     """Draw the rod with its thickness, and where it is pressed, by how much."""
     x, y, theta, _ = step.shape
     nx, ny = -0.5 * side_mm * np.sin(theta), 0.5 * side_mm * np.cos(theta)
-    drawn: list[Artist] = axes.fill(
+    drawn: list[Any] = axes.fill(
         np.concatenate([x + nx, (x - nx)[::-1]]),
         np.concatenate([y + ny, (y - ny)[::-1]]),
         color="C0", alpha=0.75, lw=0,

@@ -13,7 +13,7 @@ from ...core.errors import ConfigError, InputError
 from ...core.toml import FileModel, read_toml
 from .channels import channel
 from .curves import Arc, Point, circle, polyline, spline
-from .lumen import FEED, Gate, Lumen, Wall
+from .lumen import Gate, Lumen, Wall
 
 
 class _Leg(FileModel):
@@ -89,7 +89,7 @@ class LumenModel(FileModel):
     """A lumen file."""
 
     name: str
-    mode: Literal["feed", "push"] = FEED
+    mode: Literal["feed", "push"] = "feed"
     channel: _Channel | None = None
     wall: list[_Wall] = Key(default_factory=list)
     inside_mm: Point | None = None
@@ -109,7 +109,7 @@ class LumenModel(FileModel):
             return Lumen(
                 name=self.name,
                 walls=walls,
-                inside_mm=self.inside_mm or (entry.x_mm, entry.y_mm),
+                inside_mm=self.inside_mm or _between(walls, (entry.x_mm, entry.y_mm)),
                 entry_mm=(entry.x_mm, entry.y_mm),
                 entry_angle_deg=entry.angle_deg,
                 mode=self.mode,
@@ -136,6 +136,15 @@ class LumenModel(FileModel):
             mode=self.mode,
             gates=made.gates + gates,
         )
+
+
+def _between(walls: tuple[Wall, ...], entry_mm: Point) -> Point:
+    """Return a point inside: between where the first two open walls begin."""
+    starts = [wall.arcs[0].at(0.0) for wall in walls if not wall.closed]
+    if len(starts) < 2:
+        return entry_mm
+    (ax, ay), (bx, by) = starts[:2]
+    return 0.5 * (ax + bx), 0.5 * (ay + by)
 
 
 class _Pose(FileModel):

@@ -85,7 +85,7 @@ def contacts_of(
             force_N=float(touches.force[k] * unit_N),
             friction_N=float(friction * touches.force[k] * unit_N),
         )
-        for k in range(touches.count[0])
+        for k in range(touches.used[0])
         if touches.force[k] > 0.0
     ]
     return tuple(sorted(found, key=lambda contact: contact.s_mm))
@@ -97,7 +97,7 @@ def loads(
     """Return all loads beyond the clamp but the root's pole, shape (2,)."""
     nodes = trace(rod, u, rod.s)
     total = np.array(poles(rod, field, nodes[0], nodes[1])) + rod.beyond[0] + held
-    n = touches.count[0]
+    n = touches.used[0]
     force = touches.force[:n]
     normal = np.array([touches.nx[:n], touches.ny[:n]])
     tangent = np.array([touches.tx[:n], touches.ty[:n]])

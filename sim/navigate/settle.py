@@ -183,7 +183,7 @@ def newton(rod, field, walls, half, u, bent, t, stiff, held, before, work):  # t
             fresh = True
             continue
         share = min(1.0, LONGEST / size)
-        keep[: t.count[0]] = t.s[: t.count[0]]
+        keep[: t.used[0]] = t.s[: t.used[0]]
         done = False
         for _ in range(40):
             for i in range(u.shape[0]):
@@ -195,7 +195,7 @@ def newton(rod, field, walls, half, u, bent, t, stiff, held, before, work):  # t
             if share > 0.0 and new <= value - 1e-4 * share * fall + noise:
                 done = True
                 break
-            t.s[: t.count[0]] = keep[: t.count[0]]
+            t.s[: t.used[0]] = keep[: t.used[0]]
             if share == 0.0:
                 break
             share = 0.5 * share if share > 1e-9 else 0.0
@@ -213,7 +213,7 @@ def newton(rod, field, walls, half, u, bent, t, stiff, held, before, work):  # t
 def update_forces(rod, bent, t, stiff, held):  # type: ignore[no-untyped-def]
     """Take the walls' forces over; return the largest gap or overlap left in use."""
     worst = 0.0
-    for k in range(t.count[0]):
+    for k in range(t.used[0]):
         force = max(0.0, t.force[k] - stiff * t.gap[k])
         worst = max(worst, abs(force - t.force[k]) / stiff)
         t.force[k] = force
@@ -327,7 +327,7 @@ def rub(t, mu, stiff):  # type: ignore[no-untyped-def]
     worst = 0.0
     if mu == 0.0:
         return worst
-    for k in range(t.count[0]):
+    for k in range(t.used[0]):
         grip = mu * max(0.0, t.force[k] - stiff * t.gap[k])
         worst = max(worst, abs(grip - t.grip[k]) * 1e-3 / (1.0 + grip) * 1e-3)
         t.grip[k] = grip

@@ -16,6 +16,8 @@ from .passage import Passage
 from .walk import Walk
 
 NO_SUPPORT = Support()
+MOST_STEPS = 20_000
+"""Steps over the length of the rod."""
 DEEP = 3.0
 """Sides of the rod behind a wall beyond which a point has come round the wall's end."""
 
@@ -106,7 +108,11 @@ def navigate(
         elements=whole(elements, 2, 400, "elements"),
         tip=tip,
     )
-    walk = Walk(case, size(step_mm, "step_mm", "mm"), _limit(push_limit_N))
+    step_mm = within(
+        size(step_mm, "step_mm", "mm"), specimen.length_mm / MOST_STEPS, 1e9,
+        "step_mm", "mm",
+    )  # fmt: skip
+    walk = Walk(case, step_mm, _limit(push_limit_N))
     for target_mm in _way(way_mm, case):
         if not walk.go_to(target_mm):
             break
@@ -130,11 +136,7 @@ def _way(way_mm: object, case: Case) -> tuple[float, ...]:
     longest_mm = case.length_mm
     given = (longest_mm,) if way_mm is None else listed(way_mm) or (way_mm,)
     least = 1e-3 * longest_mm
-    way = tuple(within(w, least, longest_mm, "way_mm", "mm") for w in given)  # type: ignore[arg-type]
-    if case.feeds:
-        return way
-    # A pushed rod begins with its tip at the entry.
-    return way
+    return tuple(within(w, least, longest_mm, "way_mm", "mm") for w in given)  # type: ignore[arg-type]
 
 
 def _limit(push_limit_N: float) -> float:

@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -128,7 +129,7 @@ def steer(
     positive(every_mm, "every_mm", "mm")
     longest_mm = specimen.length_mm
     poses = [{"insertion_mm": 0.0} | start]
-    options = {"friction": friction, "refine": False}
+    options: dict[str, Any] = {"friction": friction, "refine": False}
     while poses[-1]["insertion_mm"] < longest_mm:
         at_mm = min(poses[-1]["insertion_mm"] + every_mm, longest_mm)
         tried = []
@@ -163,14 +164,14 @@ def _way(
     poses: Sequence[dict[str, float]],
     to_mm: float,
     step_mm: float,
-    options: dict[str, object],
+    options: dict[str, Any],
 ) -> Passage | None:
     """Return the rod's way to an insertion, or None if it does not get there."""
     try:
         way = navigate(
             specimen, lumen, moving(field, poses), way_mm=to_mm, step_mm=step_mm,
             **options,
-        )  # type: ignore[arg-type]  # fmt: skip
+        )  # fmt: skip
     except SolverError:
         return None
     return way if way.outcome == INSERTED else None

@@ -13,7 +13,7 @@ The gap g = distance - half the side enters the energy as an augmented Lagrangia
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,11 +35,11 @@ FIXED, FLOATS, TIP = 0, 1, 2
 
 
 class Touches(NamedTuple):
-    """Contacts; the first `count[0]` of each array are in use.
+    """Contacts; the first `used[0]` of each array are in use.
 
     Parameters
     ----------
-    count : ndarray, shape (1,)
+    used : ndarray, shape (1,)
         How many there are.
     piece, kind, s : ndarray, shape (160,)
         Piece of wall, `FIXED` and so on, arc length.
@@ -57,7 +57,7 @@ class Touches(NamedTuple):
         How far that point slipped along the tangent.
     """
 
-    count: Ints
+    used: Ints
     piece: Ints
     kind: Ints
     element: Ints
@@ -104,8 +104,10 @@ class Before(NamedTuple):
 
 def no_touches() -> Touches:
     """Return room for contacts, and none."""
-    ints = [np.zeros(1, np.int64), *(np.zeros(MOST, np.int64) for _ in range(3))]
-    return Touches(*ints, *(np.zeros(MOST) for _ in range(19)))
+    sizes: list[Any] = [np.zeros(1, np.int64)]
+    ints: list[Any] = [np.zeros(MOST, np.int64) for _ in range(3)]
+    reals: list[Any] = [np.zeros(MOST) for _ in range(19)]
+    return Touches(*sizes, *ints, *reals)
 
 
 @njit(**PART)
@@ -143,7 +145,7 @@ def nearest(rod, u, bent, walls, piece, s, home, reach):  # type: ignore[no-unty
 @njit(**PART)
 def locate(rod, u, bent, walls, half, t):  # type: ignore[no-untyped-def]
     """Bring the contacts up to date with the bent rod; floating ones move."""
-    for k in range(t.count[0]):
+    for k in range(t.used[0]):
         if t.kind[k] == FLOATS:
             t.s[k] = nearest(
                 rod, u, bent, walls, t.piece[k], t.s[k], t.home[k], t.room[k]
@@ -170,7 +172,7 @@ def locate(rod, u, bent, walls, half, t):  # type: ignore[no-untyped-def]
 @njit(**PART)
 def anchor(t, before):  # type: ignore[no-untyped-def]
     """Let friction act where the contacts are now."""
-    for k in range(t.count[0]):
+    for k in range(t.used[0]):
         t.home[k] = t.s[k]
         t.tx[k] = t.ny[k]
         t.ty[k] = -t.nx[k]
@@ -186,7 +188,7 @@ def anchor(t, before):  # type: ignore[no-untyped-def]
 def touch_energy(t, stiff, before):  # type: ignore[no-untyped-def]
     """Return what walls and friction add to the energy."""
     total = 0.0
-    for k in range(t.count[0]):
+    for k in range(t.used[0]):
         force = max(0.0, t.force[k] - stiff * t.gap[k])
         total += 0.5 * (force * force - t.force[k] * t.force[k]) / stiff
         if t.grip[k] > 0.0:
@@ -223,7 +225,7 @@ def add_dyad(v, f, n, H):  # type: ignore[no-untyped-def]
 @njit(**PART)
 def touch_gradient(rod, u, bent, t, stiff, before, px, py, ax, ay, work, g, H):  # type: ignore[no-untyped-def]
     """Add the contacts to gradient and Hessian, and their loads to px, py."""
-    for k in range(t.count[0]):
+    for k in range(t.used[0]):
         force = max(0.0, t.force[k] - stiff * t.gap[k])
         if force > 0.0:
             e = t.element[k]

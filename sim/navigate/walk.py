@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,15 +113,16 @@ def follow(case: Case, old: State, rod: Rod, shift: float) -> tuple[Array, Touch
     u = unknowns(rod, trace(old.rod, old.u, (s + ahead).ravel())[2].reshape(s.shape))
     if rod.grip[0]:
         u[-1] = rod.grip[3]
-    touches = Touches(*(array.copy() for array in old.touches))
-    n = touches.count[0]
+    copies: list[Any] = [array.copy() for array in old.touches]
+    touches = Touches(*copies)
+    n = touches.used[0]
     s_new = touches.s[:n] - ahead
     s_new[touches.kind[:n] == TIP] = rod.s[-1]
     kept = np.flatnonzero((s_new > 0.0) & (s_new <= rod.s[-1]))
     touches.s[:n] = touches.home[:n] = s_new
     for array in touches[1:]:
         array[: len(kept)] = array[kept]
-    touches.count[0] = len(kept)
+    touches.used[0] = len(kept)
     return u, touches
 
 
@@ -135,7 +137,7 @@ def history(case: Case, old: State, shift: float) -> Before:
 
 def rubbing(touches: Touches, before: Before) -> tuple[Array, Array]:
     """Return friction along the walls' tangents, and the slip that it is against."""
-    n = touches.count[0]
+    n = touches.used[0]
     slip = touches.way[:n]
     return touches.grip[:n] * np.clip(slip / before.ease, -1.0, 1.0), slip
 

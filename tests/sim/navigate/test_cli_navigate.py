@@ -85,7 +85,8 @@ def test_a_magnets_path_through_a_branch_is_a_plan_and_poses_that_do_it(tmp_path
     out = tmp_path / "steered"
     text = run(
         "steer", FORK, "--gate", "left branch", "--specimen", str(rod),
-        "--magnet", str(magnet), "--out", str(out),
+        "--magnet", str(magnet), "--every-mm", "6", "--change-mm", "20",
+        "--out", str(out),
     )  # fmt: skip
     assert "passes 'left branch'" in text
     plan = read_toml(out / "plan.toml", PlanModel)
@@ -101,7 +102,15 @@ def test_a_branch_out_of_reach_is_named():
     fork = read_lumen(Path(FORK))
     weak = {"flux_mT": Reach(low=0.0, high=1.0, change=0.5)}
     with pytest.raises(SolverError, match="no fields within reach"):
-        steer(gmc(2), fork, None, weak, gate="right branch", start={"flux_mT": 1.0})
+        steer(
+            gmc(2),
+            fork,
+            None,
+            weak,
+            gate="right branch",
+            start={"flux_mT": 1.0},
+            every_mm=10.0,
+        )
     with pytest.raises(InputError, match="gate must be one of"):
         steer(gmc(2), fork, None, weak, gate="middle", start={"flux_mT": 1.0})
 
@@ -110,7 +119,9 @@ def test_steering_to_the_mirrored_gate_takes_the_mirrored_field():
     fork = read_lumen(Path(FORK))
     reach = {"flux_mT": Reach(low=-60.0, high=60.0, change=20.0)}
     left, right = (
-        steer(gmc(2), fork, None, reach, gate=gate, start={"flux_mT": 0.0})
+        steer(
+            gmc(2), fork, None, reach, gate=gate, start={"flux_mT": 0.0}, every_mm=6.0
+        )
         for gate in ("left branch", "right branch")
     )
     for a, b in zip(left.poses, right.poses, strict=True):

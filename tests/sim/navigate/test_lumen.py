@@ -212,3 +212,25 @@ def test_poses_are_joined_by_straight_lines():
         moving(None, [{"insertion_mm": 1.0, "flux_mT": 1.0}] * 2)
     with pytest.raises(InputError, match="each pose must have insertion_mm"):
         moving(None, [{"insertion_mm": 1.0, "gap_mm": 50.0}])
+
+
+def test_an_entry_beside_the_lumen_of_a_file_is_named(tmp_path):
+    path = tmp_path / "lumen.toml"
+    path.write_text(
+        'name = "tube"\n[entry]\ny_mm = 9.0\n'
+        '[[wall]]\nname = "top"\npoints_mm = [[-5.0, 2.0], [40.0, 2.0]]\n'
+        '[[wall]]\nname = "low"\npoints_mm = [[-5.0, -2.0], [40.0, -2.0]]\n'
+    )
+    with pytest.raises(InputError, match=r"\(0, 9\) mm is outside the lumen"):
+        navigate(gmc(2), read_lumen(path), NOTHING)
+
+
+def test_a_spline_that_turns_straight_back_is_named():
+    with pytest.raises(InputError, match="must not turn straight back"):
+        spline([(0.0, 2.0), (10.0, 2.0), (0.0, 2.0)])
+
+
+def test_steps_without_end_are_refused():
+    lumen = channel("tube", width_mm=3.0, legs=[(40.0, 0.0)])
+    with pytest.raises(InputError, match=r"step_mm must be from 0\.0015"):
+        navigate(gmc(2), lumen, NOTHING, step_mm=1e-6)

@@ -279,7 +279,7 @@ def test_least_energy_of_a_chain_of_links_comes_to_the_same():
         )
         return np.concatenate([1.0 - off, 1.0 + off])
 
-    coarse, fine = (chain(rod, 24.0, n, field, walls) for n in (24, 48))
+    coarse, fine = (chain(rod, 24.0, n, field, walls) for n in (18, 36))
     tip = fine[0] + (fine[0] - coarse[0]) / 3.0
     energy = fine[1] + (fine[1] - coarse[1]) / 3.0
     assert len(last.contacts) >= 2
