@@ -22,7 +22,7 @@ from .records import AMENDMENTS_FILE, END_FILE, RUN_FILE, SCHEMA, STEPS_FILE, Re
 
 logger = logging.getLogger(__name__)
 
-_MOST_STEPS = 100_000
+_MOST_STEPS = 20_000
 _MOST_MB = 256.0
 
 
@@ -192,7 +192,7 @@ def _step(line: bytes) -> Record:
     ValueError
         If it is no such record.
     """
-    record = parse_json(line)
+    record: Record = parse_json(line)
     well = isinstance(record, dict) and isinstance(record.get("settle", {}), dict)
     if not well:
         raise ValueError("it is no object, or settle is none")

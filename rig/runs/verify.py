@@ -80,6 +80,8 @@ def check_used(run: Run, names: Iterable[str]) -> list[FileFinding]:
         compare_digest(root, name, images[name]) for name in wanted if name in images
     ]
     found += check_derived(root, wanted)
+    if run.schema == 1 and run.end:
+        found += [compare_digest(root, *one) for one in run.end["sha256"].items()]
     if run.schema > 1:
         own = (RUN_FILE, STEPS_FILE, *([END_FILE] if run.end else []))
         found += [one for one in check_records(run) if one.name in own]
