@@ -270,7 +270,8 @@ def _run(task: _Task, todo: list[Source], workers: int) -> Iterator[Done]:
             _log.warning("a worker process died; going on in this one")
         finally:
             pool.shutdown(cancel_futures=True)
-    before, last = None, None
+    before: Source | None = None
+    last: Measurement | None = None
     for source in todo[finished:]:
         near = last if before is not None and source.follows(before) else None
         done, last = task.measured(source, near)

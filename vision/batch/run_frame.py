@@ -73,7 +73,7 @@ def _in_frame(done: Done, to: Direction, run: str) -> Done:
     flags = tuple(flag for flag in row.flags if flag not in (MOVED, _DOUBTFUL))
     if direction_is_doubtful(to.sd_deg, row.length_mm):
         flags = (*flags, _DOUBTFUL)
-    x, y = _turned(*row.tip_mm, turn)
+    (x,), (y,) = _turned(*(np.array([value]) for value in row.tip_mm), turn)
     turned_row = replace(
         row,
         flags=flags,
@@ -102,9 +102,7 @@ def _tip_sd_mm(row: FrameRow, sd_deg: float) -> tuple[float, float]:
     )
 
 
-def _turned(
-    x: Array | float, y: Array | float, turn: float
-) -> tuple[Array | float, Array | float]:
+def _turned(x: Array, y: Array, turn: float) -> tuple[Array, Array]:
     """Return points in a frame that is turned counter-clockwise about its origin."""
     c, s = math.cos(turn), math.sin(turn)
     return c * x + s * y, c * y - s * x

@@ -95,8 +95,6 @@ def ring_down(time_s: Array, tip_mm: Array, *, settle_mm: float = 0.05) -> Ringi
     >>> round(found.frequency_Hz, 3), round(found.damping_ratio, 4)
     (7.0, 0.0341)
     """
-    from scipy.optimize import least_squares
-
     seen = np.all(np.isfinite(tip_mm), axis=1)
     t, place = time_s[seen], _along_the_motion(tip_mm[seen])
     first = _release(place)
@@ -107,13 +105,9 @@ def ring_down(time_s: Array, tip_mm: Array, *, settle_mm: float = 0.05) -> Ringi
             f"deflection on; instead received {len(t)}: film longer or faster"
         )
     start, t = float(t[0]), t - t[0]
-    best = min(
-        (_start(t, place, ratio) for ratio in _DECAYS), key=lambda found: found[1]
-    )
-    done = least_squares(
-        lambda x: _left(t, place, x[0], x[1])[0], best[0], x_scale=np.abs(best[0]) + 0.1
-    )
-    residual, (rest, a, b) = _left(t, place, *done.x)
+    best = min((_start(t, place, ratio) for ratio in _DECAYS), key=_loss)
+    (omega, decay), jacobian = _refined(t, place, best[0])
+    residual, (rest, a, b) = _left(t, place, omega, decay)
     freedom = max(1, len(t) - 5)
     sd = math.sqrt(float(residual @ residual) / freedom)
     amplitude = math.hypot(a, b)
@@ -122,8 +116,7 @@ def ring_down(time_s: Array, tip_mm: Array, *, settle_mm: float = 0.05) -> Ringi
             "the tip does not ring: its largest deflection is "
             f"{amplitude:.3f} mm and {sd:.3f} mm of its path is no vibration"
         )
-    omega, decay = abs(float(done.x[0])), float(done.x[1])
-    covariance = sd**2 * np.linalg.pinv(done.jac.T @ done.jac)
+    covariance = sd**2 * np.linalg.pinv(jacobian.T @ jacobian)
     omega_sd, decay_sd = np.sqrt(np.diag(covariance))
     settled = math.log(max(amplitude / settle_mm, 1.0))
     return Ringing(
@@ -171,6 +164,21 @@ def _left(t: Array, place: Array, omega: float, decay: float) -> tuple[Array, Ar
     )
     found = np.linalg.lstsq(design, place, rcond=None)[0]
     return np.asarray(place - design @ found), np.asarray(found)
+
+
+def _refined(t: Array, place: Array, start: Array) -> tuple[tuple[float, float], Array]:
+    """Return the best angular frequency and decay, and how residuals go with them."""
+    from scipy.optimize import least_squares
+
+    def left(x: Array) -> Array:
+        return _left(t, place, float(x[0]), float(x[1]))[0]
+
+    done = least_squares(left, start, x_scale=np.abs(start) + 0.1)
+    return (abs(float(done.x[0])), float(done.x[1])), np.asarray(done.jac)
+
+
+def _loss(found: tuple[Array, float]) -> float:
+    return found[1]
 
 
 def _start(t: Array, place: Array, ratio: float) -> tuple[Array, float]:

@@ -149,10 +149,11 @@ def _hidden_root(refined: Refined, ends: LocalView, setting: Setting) -> float:
     """Return the root where the clamp's top edge hides it: by height, or by length."""
     rise, along = float(ends.rise_along[0]), float(ends.along[0])
     if setting.clamp_height_mm is not None:
-        lines = refined.clamp and (refined.clamp.front or refined.clamp.face)
-        if lines is None:
+        seen = refined.clamp
+        line = None if seen is None else seen.front or seen.face
+        if line is None:
             return 0.0
-        return _below(refined, replace(lines, s=0.0), setting.clamp_height_mm, setting)
+        return _below(refined, replace(line, s=0.0), setting.clamp_height_mm, setting)
     if setting.length_mm is None:
         return 0.0
     missing = setting.length_mm * along - refined.tip.s

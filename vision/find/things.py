@@ -7,6 +7,7 @@ laid to those of other levels that it covers; what is seen at many levels is a t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
@@ -46,7 +47,7 @@ class Thing:
         """How likely it is the rod: seen at many levels, held, and whole."""
         best = self.best
         whole = 0.5 if best.contacts > 1 else 1.0
-        thin = min(best.slenderness, _THIN) ** 0.5
+        thin = math.sqrt(min(best.slenderness, _THIN))
         return whole * (len(self.seen) + 3.0 * _RANK[best.root]) * thin
 
     def covers(self, other: Candidate) -> bool:

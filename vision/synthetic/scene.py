@@ -213,4 +213,4 @@ def _smear(motion_px: tuple[float, float]) -> Picture:
         (1, 1, u * v),
     ):  # fmt: skip
         np.add.at(kernel, (i + di, j + dj), part.astype(np.float32))
-    return kernel / kernel.sum()
+    return np.asarray(kernel / kernel.sum(), np.float32)
