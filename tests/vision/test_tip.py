@@ -8,13 +8,20 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
-from magbend.vision import as_photo, extract
+from magbend.vision import Pose, as_photo, extract
 from magbend.vision.edge.clamp import ClampLines, between
 from magbend.vision.edge.step_line import (
     EndFace,
     crossings_of,
     fit_step,
     line_through,
+)
+from magbend.vision.synthetic import (
+    Block,
+    Scene,
+    SceneLight,
+    render_scene,
+    scene_camera,
 )
 from magbend.vision.synthetic.frames import CLEAN, curve, draw
 from magbend.vision.synthetic.score import signed_distance
@@ -94,3 +101,22 @@ def test_blur_does_not_pull_a_bent_rod_to_its_inner_side():
     radius = 24.0 * 18.0 / np.radians(200.0)
     pull = (1.6**2 + 0.25) / (2.0 * radius)
     assert abs(np.mean(inwards)) < 0.3 * pull
+
+
+def test_a_tip_before_its_own_deep_shade_is_not_the_end_of_the_shade():
+    """The shade falls straight ahead of the rod and is darker than half the paper."""
+    line = curve("straight", length_mm=20.0)
+    pose = Pose(x_mm=-10.0, y_mm=0.0, angle_deg=0.0, height_mm=0.9)
+    camera = scene_camera(
+        size_px=(800, 600), focal_px=5200.0, target_mm=(0.0, 0.0), tilt_deg=0.5
+    )
+    light = SceneLight(
+        shadow_direction_deg=8.0, shadow_depth=0.65, slope=1.2, softness=0.15
+    )
+    scene = Scene(clamp=Block(pose=pose), centreline=line, light=light, dust=0)
+    picture = render_scene(scene, camera, np.random.default_rng(0))
+    found = extract(
+        as_photo(picture), camera, rod_height_mm=0.9, clamp_height_mm=4.0
+    )  # fmt: skip
+    assert found.ok, found.reason
+    assert found.length_mm == pytest.approx(20.0, abs=0.06)

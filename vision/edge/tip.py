@@ -28,6 +28,8 @@ Image = NDArray[np.float32]
 
 _SHARE = 0.62
 """Part of the width that the lanes cover: clear of blurred or rounded corners."""
+_SHADE = 0.3
+"""Light of the deepest shade on paper, over paper's above the rod's."""
 _LANES = np.linspace(-0.5, 0.5, 13) * _SHARE
 
 
@@ -94,12 +96,20 @@ def find_tip(
 def _rough_end(
     profile: Array, s: Array, expected: float, reach: float, near: float, inner: float
 ) -> float | None:
-    """Find where the mean lane leaves the rod: the first time, going outwards."""
+    """Find where the mean lane leaves the rod: the first time, going outwards.
+
+    Between rod and paper may lie the rod's shade, darker than half: then the rod ends
+    where the shade begins.
+    """
     rod = median(profile[s < expected - reach - near])
     paper = quantile(profile[s > expected], 0.75)
     if not paper > rod:
         return None
-    above = (profile > 0.5 * (rod + paper)) & (s >= expected - reach)
-    above &= s <= expected + reach
-    hits = np.flatnonzero(above)
-    return float(s[hits[0]]) if hits.size else None
+    light = (profile - rod) / (paper - rod)
+    within = (s >= expected - reach) & (s <= expected + reach)
+    hits = np.flatnonzero((light > 0.5) & within)
+    if not hits.size:
+        return None
+    end = float(s[hits[0]])
+    shade = float(s[np.flatnonzero((light > _SHADE) & within)[0]])
+    return shade if end - shade > near + inner else end
