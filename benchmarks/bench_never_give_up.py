@@ -42,6 +42,7 @@ def main() -> None:
         ),
         "coil": Field(Coil(diameter_mm=80.0, current_A=100.0, turns=500)),
     }
+    why: Counter[str] = Counter()
     print(
         "source         times", *(f"{name[:12]:>13}" for name in OUTCOMES), "   us each"
     )
@@ -55,6 +56,24 @@ def main() -> None:
             print(
                 f"{name:14} {times:5g}", *(f"{c:13}" for c in counts), f"{each:10.1f}"
             )
+            for i in np.flatnonzero(found["outcome"] == OUTCOMES.index("not solved")):
+                why[_why(designs, i, source)] += 1
+    print("not solved, by what solve says:", dict(why))
+
+
+def _why(designs: dict[str, np.ndarray], i: int, source: Magnet | Field) -> str:
+    """Return the kind of error that `solve` has for a design."""
+    parts = zip(designs["length_mm"][i], designs["E_MPa"][i], strict=True)
+    rod = Rod(
+        name="random", side_mm=designs["side_mm"][i],
+        remanence_mT=designs["remanence_mT"][i],
+        sections=tuple(Section(length_mm=mm, E_MPa=MPa) for mm, MPa in parts),
+    )  # fmt: skip
+    try:
+        solve(rod, before(source).at_gap(designs["gap_mm"][i]))
+    except MagbendError as error:
+        return f"{type(error).__name__}: {str(error)[:60]}"
+    return "solved"
 
 
 if __name__ == "__main__":

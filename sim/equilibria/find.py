@@ -26,6 +26,7 @@ from ...core.units import T_from_mT
 from ..fields import (
     STABLE,
     UNSTABLE,
+    Field,
     Support,
     UniformField,
     as_field,
@@ -115,11 +116,7 @@ def planar_rod(specimen: Specimen, field: UniformField, support: Support) -> Pla
             "field must be a UniformField for the scan of all equilibria; instead "
             f"received {field}"
         )
-    if any(support.gravity_m_s2):
-        raise InputError(
-            "gravity_m_s2 must be zero for the scan of all equilibria; instead "
-            f"received {support.gravity_m_s2} m/s2: use solve() for shapes with weight"
-        )
+    _refuse_weight(support)
     rows = rod_array(specimen, support)
     moment = rows[:, M] * T_from_mT(uniform.flux_mT)
     turned = np.pi if moment[0] < 0.0 else 0.0
@@ -145,21 +142,30 @@ def planar_rod(specimen: Specimen, field: UniformField, support: Support) -> Pla
     return rod
 
 
+def _refuse_weight(support: Support) -> None:
+    if any(support.gravity_m_s2):
+        raise InputError(
+            "gravity_m_s2 must be zero for the scan of all equilibria; instead "
+            f"received {support.gravity_m_s2} m/s2: use solve() for shapes with weight"
+        )
+
+
 def find_equilibria(
     specimen: Specimen,
-    field: UniformField,
+    field: Field,
     *,
     support: Support | None = None,
     points: int = 61,
 ) -> tuple[Equilibrium, ...]:
-    """Return all planar equilibria in a uniform field, by rising tip angle.
+    """Return all planar equilibria, by rising tip angle.
 
     Parameters
     ----------
     specimen : Specimen
         Any number of sections; weightless.
-    field : UniformField
-        Any strength and angle.
+    field : UniformField, MagnetField, Field or sources
+        Any strength and angle; one that is not uniform must be planar, and the rod
+        magnetised alike all along (`equilibria.before_magnets`, which takes seconds).
     support : Support, optional
         Clamp angle and load factor; weight must be zero.
     points : int
@@ -180,7 +186,16 @@ def find_equilibria(
     [(-4.591, 0), (-3.549, 1), (1.55, 0)]
     """
     points = whole(points, 2, 1_000_000, "points")
-    rod = planar_rod(specimen, field, support or Support())
+    support = support or Support()
+    field = as_field(field)
+    if field.uniform is None:
+        check_case(specimen, field, support)
+        check_plain(specimen)
+        _refuse_weight(support)
+        from .before_magnets import equilibria_before  # which asks this module
+
+        return equilibria_before(specimen, field, support, points)
+    rod = planar_rod(specimen, field, support)
     found = [
         equilibrium(rod, v, load=1.0, turn=turn, points=points)
         for v, turn in tip_angles(rod)
