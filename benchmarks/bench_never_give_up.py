@@ -11,12 +11,15 @@ from __future__ import annotations
 
 import sys
 import time
+from collections import Counter
 
 import numpy as np
 
+from magbend.core.errors import MagbendError
 from magbend.core.magnet import Magnet
-from magbend.sim import Coil, Cuboid, Field, solve_many
+from magbend.sim import Coil, Cuboid, Field, Rod, Section, solve, solve_many
 from magbend.sim.batch import OUTCOMES
+from magbend.sim.fields import before
 
 
 def rods(rng: np.random.Generator, n: int, times: float) -> dict[str, np.ndarray]:
