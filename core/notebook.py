@@ -24,7 +24,9 @@ class Tabular:
     def _repr_html_(self) -> str:
         table = self.to_dataframe()
         more = f"<p>{len(table)} rows</p>" if len(table) > _ROWS else ""
-        shown = table.head(_ROWS).to_html(index=False, border=0, float_format="%.5g")
+        shown = table.head(_ROWS).to_html(
+            index=False, border=0, float_format="{:.5g}".format
+        )
         return f"<p>{escape(type(self).__name__)}</p>{shown}{more}"
 
 

@@ -135,6 +135,11 @@ def import_table(
         where = out / file.stem if len(groups) > 1 else out
         title = name or (file.stem if len(groups) > 1 else table.stem)
         jobs.append(_read_job(table, where, title, file, group, magnet, how))
+    for job in jobs:  # before anything is written
+        if job.out.exists() and (not job.out.is_dir() or any(job.out.iterdir())):
+            raise ConfigError(
+                f"{job.out}: is there already and not empty; name another with --out"
+            )
     return [_write(job, table, magnet, calibration_file) for job in jobs]
 
 

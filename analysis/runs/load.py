@@ -241,7 +241,9 @@ class RunData(Tabular):
         return self.points_table
 
     def _repr_html_(self) -> str:
-        steps = self.steps_table.to_html(index=False, border=0, float_format="%.5g")
+        steps = self.steps_table.to_html(
+            index=False, border=0, float_format="{:.5g}".format
+        )
         return f"<p>{escape(self.name)}: {escape(self.specimen.name)}</p>{steps}"
 
     def plot(self, ax: Axes | None = None) -> Axes:

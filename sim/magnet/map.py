@@ -13,7 +13,6 @@ The same serves any other source: a Python function of points, sampled in the bo
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,8 +23,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.arrays import real_array
 from ...core.checks import within
-from ...core.errors import ConfigError, InputError
+from ...core.errors import InputError
 from ...core.sources import FLUX_LIMIT_T
+from ...core.table import read_table
 
 Array = NDArray[np.float64]
 
@@ -172,18 +172,9 @@ def read_map(path: Path, *, tolerance_mT: float | None = None) -> FieldMap:
     ConfigError
         If the file is missing, lacks a column or holds something else than numbers.
     """
-    from ...core.toml import read_text
-
-    rows = list(csv.DictReader(read_text(path).splitlines(), skipinitialspace=True))
-    try:
-        table = np.array([[float(row[name]) for name in COLUMNS] for row in rows])
-    except (KeyError, TypeError, ValueError):
-        raise ConfigError(
-            f"{path}: a map must have the columns {', '.join(COLUMNS)}, with a number "
-            "in each row"
-        ) from None
-    if len(table) == 0:
-        raise ConfigError(f"{path}: must hold at least 12 readings; it holds none")
+    read = read_table(path)
+    read.require(*COLUMNS, hint="a map is a row a reading")
+    table = np.column_stack([read.numbers(name) for name in COLUMNS])
     return FieldMap(
         points_mm=table[:, :3], flux_mT=table[:, 3:], tolerance_mT=tolerance_mT
     )

@@ -23,7 +23,7 @@ from magbend.analysis.imports.steps import read_steps, write_template
 from magbend.analysis.runs.load import RunData
 from magbend.cli.main import app
 from magbend.core.centreline import Centreline
-from magbend.core.errors import InputError, StoreError
+from magbend.core.errors import InputError
 from magbend.core.specimen_file import specimen_dict
 from magbend.rig import verify_run
 from magbend.sim import UniformField, gmc, solve
@@ -167,7 +167,7 @@ def test_another_rod_or_side_is_refused(bench: Path) -> None:
         imported(bench)
     (bench / "rod.toml").write_text(toml(specimen_dict(gmc(2))))
     path = imported(bench)
-    with pytest.raises(StoreError, match="holds a run already"):
+    with pytest.raises(InputError, match="is there already"):
         imported(bench)
     assert len(load_run(path).steps) == 3
 

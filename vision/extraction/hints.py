@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Any
 
 import cv2
 import numpy as np
@@ -234,7 +235,7 @@ def _cheapest(cost: Array, start: Array, end: Array) -> Array:
         rows.append(a.ravel())
         columns.append(b.ravel())
         weights.append(price.ravel())
-    graph = coo_array(
+    graph: Any = coo_array(
         (np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns))),
         shape=(height * width,) * 2,
     ).tocsr()
