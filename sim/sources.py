@@ -148,7 +148,9 @@ def _source(path: Path, number: int, table: _Other) -> Source:
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"]) or "its keys"
-        raise ConfigError(f"{where}: {key}: {first['msg']}") from None
+        raise ConfigError(
+            f"{where}: {key}: {first['msg'].removeprefix('Value error, ')}"
+        ) from None
     except (InputError, TypeError) as error:
         raise ConfigError(f"{where}: {error}") from None
     return source

@@ -413,7 +413,7 @@ def test_files_hold_sources(tmp_path: Path) -> None:
         ("side_mm = 55.0", "side = 55.0", "source 0 .cuboid.: side"),
         ('"cuboid"', '"cubiod"', "kind must be one of.*cuboid.*'cubiod'"),
         ("flux_mT = 5.0", "", "source 1 .uniform.: flux_mT"),
-        ("remanence_T = 1.305", "remanence_T = 1305.0", "30 T|cannot be"),
+        ("remanence_T = 1.305", "remanence_T = 1305.0", "remanence_T: 1305 T .*in mT"),
     ):
         path.write_text(FILE.replace(old_text, new), encoding="utf-8")
         with pytest.raises(ConfigError, match=said):
