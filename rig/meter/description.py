@@ -24,6 +24,7 @@ from ...core.toml import FileModel, read_toml
 from ...core.units import tesla_per_unit
 
 OVERLOAD_TOKENS = ("OL", "OVER", "----", "9.9E37", "9.90E+37")
+_LONGEST_PATTERN = 300
 _PREFIXES = {"": 1.0, "k": 1e3, "m": 1e-3, "u": 1e-6, "µ": 1e-6, "n": 1e-9}
 
 
@@ -32,11 +33,32 @@ def _is_unit(unit: str) -> str:
     return unit
 
 
+def _repeats_repeats(pattern: str) -> bool:
+    """Return whether a group with a repetition inside is itself repeated."""
+    outer = [re.escape(sign) for sign in "*+"] + [r"\{\d+(?:,\d*)?\}"]
+    inside = r"\((?:[^()\\]|\\.|\[[^\]]*\])*(?<!\\)[*+{](?:[^()\\]|\\.)*\)"
+    flat = re.sub(r"\[(?:\\.|[^\]\\])*\]", "x", pattern)
+    while True:
+        if re.search(rf"{inside}(?:{'|'.join(outer)})", flat):
+            return True
+        less = re.sub(r"\(((?:[^()\\]|\\.)*)\)\??(?![*+{])", r"\1", flat, count=1)
+        if less == flat:
+            return False
+        flat = less
+
+
 def _is_pattern(pattern: str) -> str:
+    if len(pattern) > _LONGEST_PATTERN:
+        raise ValueError(f"must not be longer than {_LONGEST_PATTERN} characters")
     try:
         groups = set(re.compile(pattern).groupindex)
     except re.error as error:
         raise ValueError(f"must be a regular expression ({error})") from None
+    if _repeats_repeats(pattern):
+        raise ValueError(
+            "must not repeat a part that holds a repetition itself, such as (a+)+: a "
+            "reply that does not fit would be looked at for ever"
+        )
     if "value" not in groups:
         raise ValueError("must have a named group (?P<value>...)")
     unknown = groups - {"value", "sign", "unit", "multiplier", "decimals", "status"}

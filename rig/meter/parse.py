@@ -13,6 +13,9 @@ from .protocol import Sample
 _INSTRUMENT_INFINITY = 9.8e37
 """SCPI: 9.9E37 and beyond is infinity, which meters send when overloaded."""
 
+_LONGEST = 256
+"""Characters of a reply; a longer one is garbled, whatever it matches."""
+
 
 def parse_reply(
     description: MeterDescription,
@@ -43,7 +46,7 @@ def parse_reply(
     read = description.read
     if any(token and token.upper() in text.upper() for token in read.overload):
         return Sample(outcome="overload", raw=reply)
-    match = re.fullmatch(read.pattern, text)
+    match = re.fullmatch(read.pattern, text) if len(text) <= _LONGEST else None
     if match is None:
         return Sample(outcome="garbled", raw=reply)
     groups = {key: value or "" for key, value in match.groupdict().items()}

@@ -21,7 +21,7 @@ from ...link import Link
 
 _SLICE_S = 0.1
 _PATIENCE = 10.0
-_NUMBER = r"(-?\d+(?:\.\d+)?)"
+_NUMBER = r"(-?\d{1,12}(?:\.\d{1,12})?)(?!\d)"
 
 
 def nothing() -> None:
