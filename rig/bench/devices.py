@@ -6,6 +6,7 @@ import contextlib
 import logging
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from ...core.errors import MagbendError
 from ..axes.line import Axis
@@ -16,6 +17,14 @@ from ..stage.gap import GapStage
 from ..wire_log import WireLog
 
 logger = logging.getLogger(__name__)
+
+
+class Closing(Protocol):
+    """Whatever is let go at the end."""
+
+    def close(self) -> None:
+        """Let the port go."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,7 +53,8 @@ class Devices:
 
     def close(self) -> None:
         """Let every device go, also when one of them refuses."""
-        for device in (self.camera, self.meter, self.stage, *self.axes.values()):
+        every: list[Closing] = [self.camera, self.meter, self.stage]
+        for device in [*every, *self.axes.values()]:
             try:
                 device.close()
             except MagbendError as error:
