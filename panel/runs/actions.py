@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...core.checks import finite
 from ...core.errors import ConfigError, InputError
+from ...core.files import write_bytes
 from ..arguments import Arguments, Outcome
 from ..workspace import now_name, require
 from .plan_file import write_plan
@@ -110,9 +111,11 @@ def _job_command(panel: Panel, what: str, runs: list[str]) -> list[str]:
             raise ConfigError(
                 "the camera is not calibrated; do that on the page Set up first"
             )
-        calibration = panel.workspace.calibration_path.name
-        return ["vision", "extract", runs[0], "--calibration", calibration,
-                "--out", runs[0]]  # fmt: skip
+        # The run keeps the calibration that it was measured with: its report needs it.
+        kept = panel.workspace.folder / runs[0] / "calibration.json"
+        write_bytes(kept, panel.workspace.calibration_path.read_bytes())
+        return ["vision", "extract", runs[0], "--calibration",
+                f"{runs[0]}/calibration.json", "--out", runs[0]]  # fmt: skip
     commands = {
         "verify": ["rig", "verify", runs[0]],
         "fit": ["analysis", "fit", *runs],
