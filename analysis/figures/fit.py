@@ -58,7 +58,7 @@ def draw_fit_residuals(axes: Axes, fit: FitResult) -> None:
 def draw_moduli(axes: Axes, fit: FitResult) -> None:
     """Draw the fitted moduli with 95 % intervals beside the nominal ones."""
     where = np.arange(len(fit.E_MPa))
-    nominal = [section.E_MPa for section in fit.specimen.sections]
+    nominal = [section.E_MPa for section in fit.problem.specimen.sections]
     if len(nominal) == len(where):
         axes.plot(
             where, nominal, "_", color=INK, markersize=14, markeredgewidth=1.2,

@@ -293,6 +293,7 @@ def _headline(run: RunComparison) -> list[dict[str, str]]:
 def _fit_context(fit: FitResult | None) -> dict[str, Any] | None:
     if fit is None:
         return None
+    again = (*fit.E_sd_statistical_MPa, *[math.nan] * len(fit.parameters))
     rows = [
         {
             "name": name,
@@ -300,8 +301,11 @@ def _fit_context(fit: FitResult | None) -> dict[str, Any] | None:
             "sd": sd,
             "percent": 100.0 * sd / value if value else math.nan,
             "known": name not in fit.not_identifiable,
+            "again": alone,
         }
-        for name, value, sd in zip(fit.parameters, fit.values, fit.sd, strict=True)
+        for name, value, sd, alone in zip(
+            fit.parameters, fit.values, fit.sd, again, strict=False
+        )
     ]
     shares = [
         f"{kind} {100.0 * float(max(share[: len(fit.E_MPa)])):.1f} %"
