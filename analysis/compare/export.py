@@ -12,6 +12,7 @@ import numpy as np
 
 from ...core.errors import InputError, MissingExtraError
 from ...core.files import output_file, output_folder, write_bytes, write_text
+from ...core.text import defused
 from ...core.units import T_from_mT
 from .compare import RunComparison, comparison_table
 from .hierarchy import check_hdf5, nexus
@@ -194,7 +195,8 @@ def _write(data: dict[str, pd.DataFrame], out: Path, ending: str) -> list[Path]:
     for name, table in data.items():
         path = out.with_name(f"{out.stem}_{name}{ending}")
         if ending == ".csv":
-            write_text(path, table.to_csv(index=False, lineterminator="\n"))
+            cells = table.map(defused)
+            write_text(path, cells.to_csv(index=False, lineterminator="\n"))
         else:
             buffer = io.BytesIO()
             table.to_parquet(buffer, index=False)
