@@ -351,3 +351,45 @@ def test_a_locked_board_cannot_be_given_a_gap_and_says_the_way_out():
     bench.stage.connect()
     with pytest.raises(StageError, match=r"in alarm: home it, or magbend rig unlock"):
         bench.stage.assume_gap(70.0)
+
+
+FLUIDNC = {
+    b"?": b"<Alarm|MPos:0.000,0.000,0.000|FS:0,0>\r\n",
+    b"\x18": b"[MSG:INFO: FluidNC v3.7.16 https://github.com/bdring/FluidNC]\r\n"
+    b"[MSG:INFO: Axis X (0.000,180.000)]\r\n"
+    b"\r\nGrbl 3.7 [FluidNC v3.7.16 (wifi) '$' for help]\r\n"
+    b"[MSG:INFO: '$H'|'$X' to unlock]\r\n",
+    b"$I": b"[VER:3.0 FluidNC v3.7.16 (esp32-wifi) :]\r\n[OPT:PHS]\r\nok\r\n",
+    b"$G": b"[GC:G0 G54 G17 G21 G90 G94]\r\nok\r\n",
+    b"$#": b"ok\r\n",
+    b"$$": b"$20=1\r\n$21=1\r\n$22=1\r\n$23=1\r\n$100=250.000\r\n$110=600.000\r\n"
+    b"$120=50.000\r\n$130=180.000\r\nok\r\n",
+}
+
+
+@pytest.mark.parametrize(
+    ("told", "travel_mm", "homed_mm"),
+    [
+        ("at start", (0.0, 180.0), 0.0),
+        ("when asked", (5.0, 185.0), 5.0),
+        ("by the rig file", (-1.0, 179.0), -1.0),
+        ("by nobody", None, None),
+    ],
+)
+def test_a_fluidnc_counts_as_it_says_itself(told, travel_mm, homed_mm):
+    answers = dict(FLUIDNC)
+    if told != "at start":
+        answers[b"\x18"] = answers[b"\x18"].replace(b"Axis X", b"Axis")
+    asked = b"$/axes/x/homing/mpos_mm"
+    answers[asked] = b"error:3\r\n"
+    if told == "when asked":
+        answers[asked] = b"$/axes/x/homing/mpos_mm=5.000\r\nok\r\n"
+    clock, board = SteppedClock(), OldBoard(answers)
+    port = register_board("fluid", board, clock)
+    config = _config(port=port, homed_at_mm=-1.0 if told == "by the rig file" else None)
+    stage = GrblStage(config, clock)
+    stage.connect()
+    assert stage.limits.travel_mm == travel_mm
+    assert stage.limits.homed_mm == homed_mm
+    assert not any("$1 " in note for note in stage.identity.notes)
+    stage.close()
