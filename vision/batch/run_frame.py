@@ -73,7 +73,8 @@ def _in_frame(done: Done, to: Direction, run: str) -> Done:
     flags = tuple(flag for flag in row.flags if flag not in (MOVED, _DOUBTFUL))
     if direction_is_doubtful(to.sd_deg, row.length_mm):
         flags = (*flags, _DOUBTFUL)
-    (x,), (y,) = _turned(*(np.array([value]) for value in row.tip_mm), turn)
+    tip = np.array(row.tip_mm)
+    (x,), (y,) = _turned(tip[:1], tip[1:], turn)
     turned_row = replace(
         row,
         flags=flags,
