@@ -6,12 +6,16 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat
+from pydantic import ConfigDict, Field, NonNegativeFloat, PositiveFloat
 
 from .cross_section import ALL_SIZES, SIZES
 from .magnet import Magnet, Vector
+from .profile import profile_sections
 from .specimen import Section, Specimen
 from .toml import FileModel, read_toml
+
+PARTS = ("section", "profile")
+"""Keys by which a rod is divided."""
 
 
 class SectionModel(FileModel):
@@ -28,6 +32,15 @@ class SectionModel(FileModel):
     remanence_y_mT: float | None = None
     remanence_z_mT: float | None = None
     natural_curvature_per_mm: float | None = None
+
+
+class ProfileModel(FileModel):
+    """A ``[profile]`` instead of sections: values along the rod, linear between."""
+
+    model_config = ConfigDict(extra="allow")
+    s_mm: list[float]
+    E_MPa: list[float]
+    pieces: int = 60
 
 
 class SpecimenModel(FileModel):
@@ -52,22 +65,29 @@ class SpecimenModel(FileModel):
     density_sd_kg_m3: NonNegativeFloat | None = None
     natural_curvature_sd_per_mm: NonNegativeFloat | None = None
     recipe: dict[str, float | str] = Field(default_factory=dict)
-    section: list[SectionModel] = Field(min_length=1)
+    section: list[SectionModel] = Field(default_factory=list)
+    profile: ProfileModel | None = None
 
     def model_post_init(self, _context: object) -> None:
         """Check that the sizes are those of the shape."""
         for name in SIZES[self.shape]:
             if getattr(self, name) is None:
                 raise ValueError(f"{name!r} is missing: the shape is {self.shape}")
+        if bool(self.section) == (self.profile is not None):
+            raise ValueError("give either [[section]] tables or one [profile]")
 
     def specimen(self) -> Specimen:
         """Return the specimen it describes."""
         given = {
             name: value
             for name in type(self).model_fields
-            if (value := getattr(self, name)) is not None and name != "section"
+            if (value := getattr(self, name)) is not None
+            and name not in ("section", "profile")
         }
-        sections = tuple(Section(**dict(section)) for section in self.section)
+        if self.profile is not None:
+            sections = profile_sections(**self.profile.model_dump())
+        else:
+            sections = tuple(Section(**dict(section)) for section in self.section)
         return Specimen(**given, sections=sections)
 
 
@@ -129,7 +149,8 @@ def specimen_dict(specimen: Specimen) -> dict[str, object]:
     for key in SpecimenModel.model_fields:
         value = getattr(specimen, key, None)
         if key in (*SIZES[specimen.shape], "remanence_mT") or (
-            key not in ("name", "section", "recipe", *ALL_SIZES) and value != usual[key]
+            key not in ("name", "section", "profile", "recipe", *ALL_SIZES)
+            and value != usual[key]
         ):
             data[key] = value
     if specimen.recipe:

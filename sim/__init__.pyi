@@ -91,6 +91,9 @@ from .rods import (
 from .rods import (
     Section as Section,
 )
+from .rods import (
+    profile_sections as profile_sections,
+)
 from .sensitivity.derivatives import (
     Sensitivities as Sensitivities,
 )

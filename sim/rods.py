@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from ..core.profile import profile_sections
 from ..core.specimen import Section, Specimen
 
 Rod = Specimen
 """One class for plane and space: `Specimen`."""
 
-__all__ = ["Rod", "Section"]
+__all__ = ["Rod", "Section", "profile_sections"]

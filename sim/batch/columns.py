@@ -9,7 +9,8 @@ from ...core.arrays import real_array
 from ...core.checks import positive, shown, within
 from ...core.errors import InputError
 from ...core.magnet import Magnet
-from ..fields import FLUX_LIMIT_T, Field
+from ...core.sources import FLUX_LIMIT_T
+from ..fields import Field
 
 COLUMNS = {
     "side_mm": (1e-9, 1e9, "mm"),

@@ -53,7 +53,7 @@ def in_threads(
         if stop is not None and stop():
             return 0
         work(part)
-        return part.stop - part.start
+        return int(part.stop - part.start)
 
     done = 0
     if len(slices) <= 1 or workers == 1:

@@ -188,14 +188,15 @@ def find_equilibria(
     points = whole(points, 2, 1_000_000, "points")
     support = support or Support()
     field = as_field(field)
-    if field.uniform is None:
+    uniform = field.uniform
+    if uniform is None:
         check_case(specimen, field, support)
         check_plain(specimen)
         _refuse_weight(support)
         from .before_magnets import equilibria_before  # which asks this module
 
         return equilibria_before(specimen, field, support, points)
-    rod = planar_rod(specimen, field, support)
+    rod = planar_rod(specimen, uniform, support)
     found = [
         equilibrium(rod, v, load=1.0, turn=turn, points=points)
         for v, turn in tip_angles(rod)

@@ -235,7 +235,8 @@ def _rows(places: Array, points: Array, *, flat: bool) -> Array:
     if flat:
         apart = points[:, None] - places * [1.0, 1.0, -1.0]
         one = one + apart / np.linalg.norm(apart, axis=2, keepdims=True) ** 3
-    return one.transpose(0, 2, 1).reshape(-1, len(places))
+    rows: Array = one.transpose(0, 2, 1).reshape(-1, len(places))
+    return rows
 
 
 def _fits(rows: Array, flux: Array) -> dict[float, Array]:

@@ -121,8 +121,9 @@ def animate_path(file: File, path: Path, *, title: str) -> None:
         axes.set_title(
             f"{title}: {name} {one.value:.4g} {unit}, {one.status}", fontsize=8
         )
-        canvas.draw()
-        frames.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("P"))
+        canvas.draw()  # type: ignore[no-untyped-call]
+        pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
+        frames.append(Image.fromarray(pixels).convert("P"))
     buffer = io.BytesIO()
     frames[0].save(
         buffer, "GIF", save_all=True, append_images=frames[1:], duration=80, loop=0

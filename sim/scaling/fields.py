@@ -76,7 +76,7 @@ def field_array(field: Field, length_mm: float) -> Array:
             "field must be a UniformField in mT, a MagnetField in mm or a Field of "
             f"sources; instead received {shown(field)}"
         )
-    row = field_rows(field, None, np.array([length_mm]))[0]
+    row: Array = field_rows(field, None, np.array([length_mm]))[0]
     if len(field.sources) > 1:
         _refuse_overlap(field, row, length_mm)
     return row
@@ -127,7 +127,7 @@ def _template(field: Field) -> _Template:
     records = [_record(source) for source in sources]
     kinds = [row[0] for row, *_ in records]
     if all(kind == flux.UNIFORM for kind in kinds):
-        total = sum(row for row, *_ in records)
+        total: Array = np.sum([row for row, *_ in records], axis=0)
         return _joined([(total, *records[0][1:])], [], waits=False)
     waits = any(source.follows_gap for source in sources)
     if kinds == [flux.CUBOID]:
@@ -261,8 +261,11 @@ def _refuse_overlap(field: Field, row: Array, length_mm: float) -> None:
 def _within(body: Array, points: Array) -> NDArray[np.bool_]:
     """Tell of points whether they are in a body."""
     p = (points - body[4:7]) @ body[7:16].reshape(3, 3).T
+    across: Array = np.hypot(p[:, 0], p[:, 1])
     if body[0] == flux.DIPOLE:
-        return np.linalg.norm(p, axis=1) <= body[1]
-    if body[0] == flux.CYLINDER:
-        return (np.hypot(p[:, 0], p[:, 1]) <= body[1]) & (np.abs(p[:, 2]) <= body[3])
-    return np.all(np.abs(p) <= body[1:4], axis=1)
+        inside: NDArray[np.bool_] = np.hypot(across, p[:, 2]) <= body[1]
+    elif body[0] == flux.CYLINDER:
+        inside = (across <= body[1]) & (np.abs(p[:, 2]) <= body[3])
+    else:
+        inside = np.all(np.abs(p) <= body[1:4], axis=1)
+    return inside

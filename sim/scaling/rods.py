@@ -14,9 +14,10 @@ from ...core.checks import whole
 from ...core.cross_section import SIZES
 from ...core.errors import InputError
 from ...core.jit import njit
+from ...core.sources import FLUX_LIMIT_T
 from ...core.specimen import Specimen
 from ...core.units import MU0
-from ..fields import FLUX_LIMIT_T, Support
+from ..fields import Support
 from ..magnet.flux import PART
 from ..planar.march import WX, WY, E, H, M
 

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from ...core.checks import positive, size, store, vector, within
 from ...core.cross_section import torsion_constant_mm4
 from ...core.errors import InputError
+from ...core.sources import FLUX_LIMIT_T
 from ...core.specimen import Specimen, parts
 from ...core.units import MU0
-from ..fields import FLUX_LIMIT_T, Support
+from ..fields import Support
 from .march import AXIAL, C1, C3, K1, K3, MU1, MU2, WIDTH, WX, WZ, H  # fmt: skip
 
 Array = NDArray[np.float64]

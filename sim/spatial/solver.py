@@ -12,6 +12,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +21,10 @@ from ...core.centreline import Centreline
 from ...core.checks import shown, vector, whole
 from ...core.errors import InputError, SolverError
 from ...core.jit import plain_first
+from ...core.sources import FLUX_LIMIT_T
 from ...core.specimen import Specimen
 from ...core.units import mT_from_T, rad_from_deg
 from ..fields import (
-    FLUX_LIMIT_T,
     PULLED_IN,
     STABLE,
     UNSTABLE,
@@ -264,7 +265,7 @@ def _flux_array(field: Field | Sequence[float], length_mm: float) -> Array:
     return out
 
 
-def _is_vector(field: object) -> bool:
+def _is_vector(field: Any) -> bool:
     """Tell three numbers from a field and from sources."""
     if isinstance(field, np.ndarray):
         return True

@@ -11,6 +11,7 @@ import pytest
 
 from magbend.core.cross_section import SIZES, cross_section, torsion_constant_mm4
 from magbend.core.errors import ConfigError, InputError
+from magbend.core.profile import profile_sections
 from magbend.core.specimen import Section, Specimen
 from magbend.core.specimen_file import read_specimen, specimen_dict
 
@@ -130,3 +131,35 @@ def test_a_file_names_the_missing_size(tmp_path: Path) -> None:
     )
     with pytest.raises(ConfigError, match="'diameter_mm' is missing"):
         read_specimen(path)
+
+
+def test_a_profile_is_many_sections(tmp_path: Path) -> None:
+    path = tmp_path / "rod.toml"
+    path.write_text(
+        'name = "A"\nside_mm = 1.0\nremanence_mT = 20.0\n'
+        "[profile]\ns_mm = [0, 10, 30]\nE_MPa = [20, 15, 10]\npieces = 30\n"
+        "side_mm = [1.2, 1.0, 0.8]\n",
+        encoding="utf-8",
+    )
+    found = read_specimen(path)
+    assert found.length_mm == pytest.approx(30.0)
+    assert len(found.sections) == 30
+    assert found.sections[0].E_MPa == pytest.approx(19.75)
+    assert found.sides_mm[-1] == pytest.approx(0.805)
+    assert found.sections == profile_sections(
+        [0, 10, 30], pieces=30, E_MPa=[20, 15, 10], side_mm=[1.2, 1.0, 0.8]
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"s_mm": [0.0, 0.0], "E_MPa": [1.0, 1.0]}, "must rise from 0"),
+        ({"s_mm": [0.0, 5.0], "E_MPa": [1.0]}, "2 values"),
+        ({"s_mm": [0.0, 5.0]}, "must have E_MPa"),
+        ({"s_mm": [0.0, 5.0], "E_MPa": [1.0, 1.0], "colour": [1.0, 2.0]}, "colour"),
+    ],
+)
+def test_profiles_that_cannot_be_are_refused(given: dict, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        profile_sections(**given)

@@ -16,6 +16,7 @@ from magbend.sim import (
     Support,
     UniformField,
     find_equilibria,
+    profile_sections,
     sensitivities,
     solve,
     solve_many,
@@ -148,3 +149,24 @@ def test_designs_refuse_sizes_of_two_shapes() -> None:
         solve_many(base | {"side_mm": 1.0, "diameter_mm": 1.0})
     with pytest.raises(InputError, match=r"bore_mm.*below"):
         solve_many(base | {"bore_mm": 1.0, "diameter_mm": 1.0})
+
+
+def test_a_profile_converges_with_the_second_power_of_its_pieces() -> None:
+    tips = []
+    for pieces in (10, 20, 40, 160):
+        sections = profile_sections([0.0, 30.0], pieces=pieces, E_MPa=[20.0, 5.0])
+        one = rod("square", sections=sections)
+        tips.append(solve(one, FIELDS[0]).centreline.tip_mm[1])
+    off = [abs(tip - tips[-1]) for tip in tips[:-1]]
+    assert 3.5 < off[0] / off[1] < 4.6
+    assert 3.5 < off[1] / off[2] < 4.8
+
+
+def test_a_rod_of_500_sections_is_solved() -> None:
+    sections = profile_sections([0.0, 30.0], pieces=500, E_MPa=[12.0, 12.0])
+    whole = rod("square", sections=(Section(length_mm=30.0, E_MPa=12.0),))
+    for field in FIELDS:
+        one = solve(rod("square", sections=sections), field)
+        np.testing.assert_allclose(
+            one.centreline.tip_mm, solve(whole, field).centreline.tip_mm, atol=1e-9
+        )
