@@ -65,6 +65,8 @@ FIRST = 0.6
 """Largest first correction from the straight rod."""
 NEAR = 1e-3
 """Correction after which a coarse iteration has done its part."""
+TINY = 1e-12
+"""Correction that is taken for the last, whatever the next residual may be."""
 ENOUGH = 1e-13
 """Difference between the orders that is left uncorrected, in lengths of the rod."""
 
@@ -184,7 +186,8 @@ def _solve_row(  # type: ignore[no-untyped-def]
                 if stage == FINE:
                     # In long rods the next residual may be large, small as u is.
                     spread = abs(D[0, 0]) + abs(D[0, 1]) + abs(D[0, 2])
-                    done = change < SMALL and change * change * spread < ENOUGH
+                    quick = change * change * spread < ENOUGH
+                    done = change < SMALL and (quick or change < TINY)
                 if not size < math.inf or not (
                     done or (change < first and change <= SHRINK * before and k < 20)
                 ):
@@ -330,8 +333,9 @@ def _solve_by_following(
     else:
         found[0, 0] = GONE if index == -1 else FAILED
         found[0, 6] = load
-        if index == -2 and reach_there(rods[0], fields[0], u[0]) > MAX_REACH_NEWTON:
-            found[0, 0] = TOO_STRONG
+    failed = found[0, 0] == FAILED
+    if failed and reach_there(rods[0], fields[0], u[0]) > MAX_REACH_NEWTON:
+        found[0, 0] = TOO_STRONG
 
 
 def _load_before_touching(end: float, rod: Array, *rest: Any) -> float:
