@@ -10,6 +10,7 @@ simplex goes on; the best of all is pushed through again on fine steps.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,7 +127,7 @@ def design_through(
             f"no rod that can be made has a tip stiffness of {stiffness_N_mm:g} N/mm: "
             "ask for another, or widen E_MPa or side_mm of what can be made"
         )
-    coarse = {
+    coarse: dict[str, Any] = {
         "friction": friction, "step_mm": COARSE_MM, "elements": COARSE_ELEMENTS,
         "push_limit_N": 1e3 * stiffness_N_mm,
     }  # fmt: skip
