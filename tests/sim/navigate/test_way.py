@@ -110,14 +110,26 @@ def test_a_push_beyond_its_limit_ends_the_way():
     assert passage.steps[-1].push_N > 0.1
 
 
-def test_a_blind_end_makes_the_rod_fold_and_snap():
+def test_a_blind_end_makes_the_rod_snap_and_it_snaps_back_later():
+    """Forth it snaps near 24.5 mm, back near 22.8 mm: between, two states each."""
     passage = navigate(
-        gmc(2), blind(), UniformField(flux_mT=5.0), way_mm=24.6, refine=False
-    )
-    assert passage.most("push_N") > 0.5
-    snap = passage.snaps[0]
-    assert snap.released_Nmm > 0.0
-    assert snap.moved_mm > 1.0
+        gmc(2), blind(), UniformField(flux_mT=5.0), way_mm=(24.52, 24.0, 22.0),
+        refine=False,
+    )  # fmt: skip
+    turn = next(i for i, s in enumerate(passage.steps) if s.insertion_mm == 24.52)
+    out, back = passage.steps[:turn], passage.steps[turn:]
+    assert max(step.push_N for step in out) > 0.5
+    forth, home = passage.snaps[0], passage.snaps[-1]
+    assert forth.released_Nmm > 0.0
+    assert home.released_Nmm > 0.0
+    assert forth.moved_mm > 1.0
+    assert home.insertion_mm < forth.insertion_mm - 1.0
+
+    def push_N(steps, at_mm):
+        return next(s.push_N for s in steps if abs(s.insertion_mm - at_mm) < 1e-6)
+
+    assert push_N(back, 24.0) < 0.2 * push_N(out, 24.0)
+    assert push_N(back, 22.0) == pytest.approx(push_N(out, 22.0), rel=1e-3)
     for step in passage.steps:
         assert step.shape[0].max() < 20.0
         assert abs(step.shape[1]).max() < 2.0
