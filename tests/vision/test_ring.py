@@ -10,7 +10,7 @@ from magbend.core.errors import VisionError
 from magbend.vision import Setting, extract_files, ring_down, ring_of_film
 from magbend.vision.batch import run as batch_run
 from magbend.vision.batch.tables import read_frames
-from magbend.vision.synthetic import CLEAN, curve, draw
+from magbend.vision.synthetic import CLEAN, curve, draw, scene_camera
 
 SIZE, SCALE = (480, 320), 8.0
 
@@ -83,6 +83,9 @@ def test_the_swing_of_a_film_is_measured(film):
     assert found.damping_ratio == pytest.approx(1.5 / (2.0 * np.pi * 5.0), rel=0.1)
     slow = ring_of_film(path, setting, fps=240.0)
     assert slow.frequency_Hz == pytest.approx(20.0, abs=0.2)
+    other = Setting(calibration=scene_camera())
+    with pytest.raises(VisionError, match="no frame could be measured.*1600 x 1200"):
+        ring_of_film(path, other)
     with pytest.raises(VisionError, match="no such file"):
         ring_of_film(path.with_name("none.avi"), setting)
 

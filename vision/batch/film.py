@@ -93,5 +93,8 @@ def ring_of_film(
         last = follow(photo, setting, last)
         tips.append(last.tip_mm)
         progress(number, max(count, number))
+    if last is None or not np.any(np.isfinite(tips)):
+        why = "it has no frames" if last is None else last.reason
+        raise VisionError(f"{path.name}: no frame could be measured: {why}")
     time_s = np.arange(len(tips)) / rate
     return ring_down(time_s, np.reshape(tips, (-1, 2)), settle_mm=settle_mm)
