@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 from analysis_factory import MAGNET, write_run
 
-from magbend import sim
-from magbend.analysis import fit_runs, load_run
+from magbend import analysis, sim
+from magbend.analysis import load_run
 from magbend.analysis.fit.nuisance import NUISANCE_NAMES, Nuisance
 from magbend.analysis.fit.problem import build_problem
 from magbend.analysis.fit.residuals import residuals
@@ -22,6 +23,7 @@ from magbend.analysis.twin.run import bench_run
 from magbend.core.errors import InputError, SolverError, StoreError
 from magbend.core.specimen import Specimen
 
+fit_runs = partial(analysis.fit_runs, judged=False)
 HELD = Nuisance(**dict.fromkeys(NUISANCE_NAMES, 0.0))
 
 
@@ -44,7 +46,7 @@ def test_a_photograph_that_knows_its_direction_narrows_the_interval(
     for stated_deg in (0.02, 0.5, math.nan):
         path = tmp_path / str(stated_deg)
         write_run(path, sigma_mm=0.01, clamp_angle_sd_deg=stated_deg)
-        fit = fit_runs([load_run(path)], judged=False)
+        fit = fit_runs([load_run(path)])
         priors = {n["prior_sd"] for n in fit.nuisance if n["name"] == "frame_angle_deg"}
         assert priors == {stated_deg if math.isfinite(stated_deg) else 0.3}
         sds.append(fit.E_sd_MPa[0])
@@ -91,7 +93,7 @@ def test_intervals_hold_on_photographs(tmp_path: Path) -> None:
         run = load_run(tmp_path / str(k))
         assert run.magnet is not None
         truth = hide(run.specimen, run.magnet, seed=1000 + k).specimen
-        fit = fit_runs([run], nuisance=AS_HIDDEN, judged=False)
+        fit = fit_runs([run], nuisance=AS_HIDDEN)
         for i, section in enumerate(truth.sections):
             if f"E_MPa[{i}]" not in fit.not_identifiable:
                 z.append((fit.E_MPa[i] - section.E_MPa) / fit.E_sd_MPa[i])
@@ -217,14 +219,14 @@ def test_bounds_order_and_prior_are_kept(tmp_path: Path) -> None:
     bounded = fit_runs([run], nuisance=HELD, bounds_MPa=(12.0, 16.0))
     assert min(bounded.E_MPa) >= 12.0 - 1e-9
     assert max(bounded.E_MPa) <= 16.0 + 1e-9
-    prior = fit_runs([run], prior_MPa=(8.0, 50.0), judged=False)
-    assert prior.E_sd_MPa[2] <= fit_runs([run], judged=False).E_sd_MPa[2]
+    prior = fit_runs([run], prior_MPa=(8.0, 50.0))
+    assert prior.E_sd_MPa[2] <= fit_runs([run]).E_sd_MPa[2]
 
 
 def test_widening_a_prior_widens_the_intervals(tmp_path: Path) -> None:
     run = load_run(write_run(tmp_path / "a", sigma_mm=0.01))
-    narrow = fit_runs([run], nuisance=HELD, judged=False)
-    wide = fit_runs([run], nuisance=replace(HELD, remanence_percent=5.0), judged=False)
+    narrow = fit_runs([run], nuisance=HELD)
+    wide = fit_runs([run], nuisance=replace(HELD, remanence_percent=5.0))
     assert all(b > a for a, b in zip(narrow.E_sd_MPa, wide.E_sd_MPa, strict=True))
     assert wide.E_sd_MPa[0] / wide.E_MPa[0] > 0.045
 

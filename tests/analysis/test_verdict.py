@@ -57,7 +57,7 @@ def test_wrong_models_are_covered_or_not_supported_often(name: str) -> None:
     assert np.mean(held) >= 0.95
 
 
-@pytest.mark.parametrize("runs", [12, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("runs", [6, pytest.param(200, marks=pytest.mark.slow)])
 def test_a_right_model_is_supported_and_covered(runs: int) -> None:
     z, words = [], []
     for seed in range(700, 700 + runs):
