@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -57,6 +58,13 @@ def test_weight_within_the_plane_is_the_free_rods():
     )
     free = solve(rod, NOTHING, support=support).centreline
     assert math.dist(passage.steps[-1].tip_mm, free.tip_mm) < 1e-8
+
+
+def test_a_rod_that_is_curved_by_nature_is_the_free_rods():
+    rod = replace(gmc(2), natural_curvature_per_mm=0.02)
+    field = UniformField(flux_mT=50.0)
+    last = navigate(rod, wide(), field, step_mm=30.0, refine=False).steps[-1]
+    assert math.dist(last.tip_mm, solve(rod, field).centreline.tip_mm) < 1e-8
 
 
 def test_the_elements_are_of_sixth_order():
