@@ -206,8 +206,14 @@ def solve_shapes(
         fields = field_rows(before(designs.magnet), designs.gap_mm, total_mm)
     elif designs.flux_mT is not None:
         fields = uniform_rows(designs.flux_mT * 1e-3, designs.angle_deg)
-    columns = stations, rods, fields, total_mm, margins, out, status, error
-    in_threads(lambda rows: _solve(*(c[rows] for c in columns)), n, ROWS_PER_CALL)
+
+    def work(rows: slice) -> None:
+        _solve(
+            stations[rows], rods[rows], fields[rows], total_mm[rows], margins[rows],
+            out[rows], status[rows], error[rows],
+        )  # fmt: skip
+
+    in_threads(work, n, ROWS_PER_CALL)
     return Shapes(points=out, status=status, error_mm=error)
 
 

@@ -427,3 +427,30 @@ def test_weight_acts_beside_any_source() -> None:
     rod = replace(gmc(2), density_kg_m3=2640.0)
     found = solve(rod, PLANAR["cylinder"], support=held)
     assert verify(rod, PLANAR["cylinder"], found, support=held) < 1e-7
+
+
+class _Elsewhere:
+    """A kind of source that another package offers, in plain Python."""
+
+    def __init__(self, flux_mT: float) -> None:
+        self.flux = flux_mT
+        self.box_mm = BOX
+
+    def flux_mT(self, points_mm: np.ndarray) -> np.ndarray:
+        return np.tile([0.0, self.flux, 0.0], (len(points_mm), 1))
+
+
+def test_other_packages_offer_kinds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "magbend.sim.sources.load_plugin", lambda _group, _kind, own: _Elsewhere
+    )
+    path = tmp_path / "field.toml"
+    path.write_text('[[source]]\nkind = "elsewhere"\nflux_mT = 50.0\n')
+    found = solve(gmc(2), read_field(path)).centreline.tip_mm
+    same = solve(gmc(2), UniformField(flux_mT=50.0)).centreline.tip_mm
+    assert math.dist(found, same) < 1e-3
+    path.write_text('[[source]]\nkind = "elsewhere"\n')
+    with pytest.raises(ConfigError, match=r"source 0 .elsewhere."):
+        read_field(path)
