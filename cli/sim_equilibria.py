@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import print_json
-from .sim_case import rod_of
+from .sim_case import field_of, rod_of
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
@@ -29,11 +29,18 @@ def equilibria(
         bool, typer.Option("--remeasured", help="With --gmc: the sides as remeasured.")
     ] = False,
     field_mT: Annotated[
-        float, typer.Option("--field-mT", help="Uniform flux density in mT.")
-    ] = 50.0,
+        float | None,
+        typer.Option("--field-mT", help="Uniform flux density in mT; 50 by default."),
+    ] = None,
     angle_deg: Annotated[
         float, typer.Option(help="Direction of the field from +x, in deg.")
     ] = 90.0,
+    magnet: Annotated[
+        Path | None, typer.Option(help="Magnet or source file (TOML), instead.")
+    ] = None,
+    gap_mm: Annotated[
+        float | None, typer.Option(help="From the N face to the undeformed tip, in mm.")
+    ] = None,
     clamp_angle_deg: Annotated[
         float, typer.Option(help="Direction of the clamp from +x, in deg.")
     ] = 0.0,
@@ -51,10 +58,16 @@ def equilibria(
     from ..core.jit import once
     from ..sim.equilibria.find import find_equilibria
     from ..sim.equilibria.folds import trace_branches
-    from ..sim.fields import Support, UniformField
+    from ..sim.fields import Support
 
     rod = rod_of(gmc, specimen, remeasured)
-    field = UniformField(flux_mT=field_mT, angle_deg=angle_deg)
+    if magnet is None and field_mT is None:
+        field_mT = 50.0
+    field = field_of(magnet, gap_mm, field_mT, angle_deg)
+    if field.follows_gap:
+        raise typer.BadParameter("--magnet needs --gap-mm D")
+    if field_mT is None and (fold or figure is not None):
+        raise typer.BadParameter("--fold and --figure belong to --field-mT")
     support = Support(clamp_angle_deg=clamp_angle_deg, load_factor=load_factor)
     if figure is not None:
         output_file(figure)
@@ -65,33 +78,35 @@ def equilibria(
     if figure is not None:
         from ..sim.study.equilibria_figure import draw_equilibria
 
-        title = f"{rod.name}, {field_mT:g} mT at {angle_deg:g} deg"
+        title = f"{rod.name}, {field_mT or 0.0:g} mT at {angle_deg:g} deg"
         draw_equilibria(figure, found, branches, title=title)
     folds = sorted(
         (one for branch in branches for one in branch.folds),
         key=lambda one: abs(one.flux_mT),
     )
     if as_json:
-        print_json(_data(rod, field_mT, angle_deg, found, folds if fold else None))
+        where = {"flux_mT": field_mT, "angle_deg": angle_deg}
+        if field_mT is None:
+            where = {"gap_mm": gap_mm}
+        print_json(_data(rod, where, found, folds if fold else None))
         return
-    _print(rod, field_mT, angle_deg, found)
+    said = f"{field_mT:g} mT at {angle_deg:g} deg" if field_mT is not None else magnet
+    _print(f"{rod.name}, {said}", found)
     if fold:
-        _print_folds(folds, field_mT)
+        _print_folds(folds, field_mT or 0.0)
     if figure is not None:
         typer.echo(f"wrote {figure}")
 
 
 def _data(
     rod: Specimen,
-    field_mT: float,
-    angle_deg: float,
+    where: dict[str, float | None],
     found: tuple[Equilibrium, ...],
     folds: list[Fold] | None,
 ) -> dict[str, Any]:
     data: dict[str, Any] = {
         "specimen": rod.name,
-        "flux_mT": field_mT,
-        "angle_deg": angle_deg,
+        **where,
         "count": len(found),
         "equilibria": [
             {
@@ -116,11 +131,9 @@ def _data(
     return data
 
 
-def _print(
-    rod: Specimen, field_mT: float, angle_deg: float, found: tuple[Equilibrium, ...]
-) -> None:
+def _print(case: str, found: tuple[Equilibrium, ...]) -> None:
     count = "1 equilibrium" if len(found) == 1 else f"{len(found)} equilibria"
-    typer.echo(f"{rod.name}, {field_mT:g} mT at {angle_deg:g} deg: {count}")
+    typer.echo(f"{case}: {count}")
     typer.echo("  tip angle deg       tip x mm     tip y mm  Morse index")
     for one in found:
         x, y = one.tip_mm

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from magbend.cli import sim as cli
 from magbend.core.errors import InputError, SolverError
 from magbend.sim import (
     Cuboid,
@@ -76,3 +80,19 @@ def test_what_the_scan_cannot_take_is_refused() -> None:
     off = Field(replace(CUBE, elevation_deg=5.0), gap_mm=60.0)
     with pytest.raises(InputError, match="within the plane"):
         find_equilibria(gmc(2), off)
+
+
+def test_the_command_lists_equilibria_before_a_magnet(tmp_path: Path) -> None:
+    rod, magnet = tmp_path / "rod.toml", tmp_path / "magnet.toml"
+    rod.write_text(
+        'name = "strong"\nside_mm = 1.0\nremanence_mT = 200\n'
+        "[[section]]\nlength_mm = 30\nE_MPa = 14\n"
+    )
+    magnet.write_text("side_mm = 55.0\nremanence_T = 1.305\n")
+    options = ["equilibria", "--specimen", str(rod), "--magnet", str(magnet)]
+    done = CliRunner().invoke(cli.app, [*options, "--gap-mm", "45", "--json"])
+    found = json.loads(done.output)
+    signs = [(-1) ** one["morse_index"] for one in found["equilibria"]]
+    assert sum(signs) == 1
+    assert found["count"] == len(signs)
+    assert CliRunner().invoke(cli.app, options).exit_code == 2
