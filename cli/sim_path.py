@@ -176,9 +176,9 @@ def _print(name: str, found: Followed, files: list[Path | None]) -> None:
             f"  {one.kind:8} at {one.value:.6g} {unit}, {quantity} {one.direction}, "
             f"tip ({x:.4f}, {y:.4f}) mm"
         )
-    if not found.folds:
-        typer.echo("  no fold: the rod goes back the way it came")
     lost = sum(one.centreline is None for one in found.points)
+    if not found.folds and not lost:
+        typer.echo("  no fold: the rod goes back the way it came")
     if lost:
         typer.echo(f"  pulled in at {lost} points")
     if found.dissipated_uJ > 0.0:
