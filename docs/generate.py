@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
 import io
 import shutil
 import sys
@@ -70,14 +71,18 @@ def api(face: str, title: str, told: set[int]) -> str:
         told.add(id(value))
         if isinstance(value, type):
             lines += [f".. autoclass:: {face}.{name}", "   :members:", ""]
-        elif callable(value):
+        elif inspect.isroutine(value):
             lines += [f".. autofunction:: {face}.{name}", ""]
-    plain = [n for n in module.__all__ if not callable(getattr(module, n))]
+    plain = [n for n in module.__all__ if _is_plain(getattr(module, n))]
     if plain:
         lines += ["Constants", "---------", ""]
         for name in sorted(plain):
             lines.append(f"* ``{name}`` = ``{_short(getattr(module, name))}``")
     return "\n".join(lines) + "\n"
+
+
+def _is_plain(value: object) -> bool:
+    return not isinstance(value, type) and not inspect.isroutine(value)
 
 
 def _short(value: object) -> str:
