@@ -49,7 +49,7 @@ class Field:
     >>> field = Field(Cuboid(sides_mm=55.0, remanence_T=1.3, gap_mm=60.0),
     ...               Uniform(flux_mT=-5.0))
     >>> round(solve(gmc(2), field).centreline.tip_mm[1], 3)
-    3.76
+    3.73
     """
 
     __slots__ = ("_sources",)

@@ -160,7 +160,7 @@ def follow_path(
     >>> path = follow_path(gmc(2), Cuboid(sides_mm=55.0, remanence_T=1.3),
     ...                    gap_mm=(120.0, 60.0), steps=3)
     >>> [round(point.centreline.tip_mm[1], 2) for point in path.points]
-    [0.9, 1.45, 2.42, 4.13]
+    [1.01, 1.54, 2.46, 4.14]
     """
     support = support or Support()
     field = as_field(field)
