@@ -1,8 +1,77 @@
 from .compare.compare import (
+    RunComparison as RunComparison,
+)
+from .compare.compare import (
+    check_any as check_any,
+)
+from .compare.compare import (
     compare_run as compare_run,
 )
 from .compare.compare import (
     comparison_table as comparison_table,
+)
+from .compare.compare import (
+    uniform_rod as uniform_rod,
+)
+from .compare.compare import (
+    write_comparison as write_comparison,
+)
+from .compare.export import (
+    check_export as check_export,
+)
+from .compare.export import (
+    export_runs as export_runs,
+)
+from .compare.metrics import (
+    circularity as circularity,
+)
+from .compare.metrics import (
+    position_at as position_at,
+)
+from .demo import (
+    run_demo as run_demo,
+)
+from .design.goals import (
+    Goal as Goal,
+)
+from .design.goals import (
+    radius_goal as radius_goal,
+)
+from .design.makeable import (
+    Makeable as Makeable,
+)
+from .design.path import (
+    read_path as read_path,
+)
+from .design.search import (
+    Design as Design,
+)
+from .design.search import (
+    Task as Task,
+)
+from .design.search import (
+    find_designs as find_designs,
+)
+from .design.through import (
+    Through as Through,
+)
+from .design.through import (
+    design_through as design_through,
+)
+from .doctor import (
+    as_dicts as as_dicts,
+)
+from .doctor import (
+    examine as examine,
+)
+from .examples import (
+    copy_examples as copy_examples,
+)
+from .expansion.data import (
+    inputs_of as inputs_of,
+)
+from .figures.several import (
+    gmc_numbers as gmc_numbers,
 )
 from .figures.write import (
     write_figures as write_figures,
@@ -71,16 +140,49 @@ from .imports.judge import (
     Reading as Reading,
 )
 from .imports.run import (
+    ImportedRun as ImportedRun,
+)
+from .imports.run import (
     import_table as import_table,
 )
 from .imports.steps import (
     write_template as write_template,
+)
+from .library.query import (
+    write_table as write_table,
+)
+from .library.space import (
+    read_space as read_space,
+)
+from .library.sql import (
+    ask as ask,
 )
 from .package.crate import (
     Description as Description,
 )
 from .package.crate import (
     write_package as write_package,
+)
+from .paper.audit import (
+    audit_paper as audit_paper,
+)
+from .paper.audit import (
+    write_audit as write_audit,
+)
+from .paper.paper import (
+    reproduce as reproduce,
+)
+from .paper.probe import (
+    fit_standoff as fit_standoff,
+)
+from .paper.probe import (
+    from_probe_reading as from_probe_reading,
+)
+from .paper.probe import (
+    read_probe_csv as read_probe_csv,
+)
+from .paper.probe import (
+    remanence_from_probe_mT as remanence_from_probe_mT,
 )
 from .recipe.law import (
     Law as Law,
@@ -115,6 +217,45 @@ from .recipe.rods import (
 from .report.build import (
     write_report as write_report,
 )
+from .runs.field_scan import (
+    judge_scan as judge_scan,
+)
+from .runs.load import (
+    RunData as RunData,
+)
 from .runs.load import (
     load_run as load_run,
+)
+from .runs.load import (
+    load_runs as load_runs,
+)
+from .runs.witness import (
+    FieldWitness as FieldWitness,
+)
+from .runs.witness import (
+    witness_of as witness_of,
+)
+from .schemas import (
+    toml_schema as toml_schema,
+)
+from .schemas import (
+    write_toml_schemas as write_toml_schemas,
+)
+from .twin.bench import (
+    TwinBench as TwinBench,
+)
+from .twin.plan_preview import (
+    preview_plan as preview_plan,
+)
+from .twin.run import (
+    bench_run as bench_run,
+)
+from .twin.run import (
+    keep_board as keep_board,
+)
+from .twin.run import (
+    open_twin_bench as open_twin_bench,
+)
+from .warm_up import (
+    main as main,
 )

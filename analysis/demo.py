@@ -6,8 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..core.errors import StoreError
-from ..rig.bench.config import read_plan
-from ..rig.bench.template import write_templates
+from ..rig import read_plan, write_templates
 from .compare.compare import compare_run, write_comparison
 from .fit.runs import try_fit
 from .report import write_report

@@ -111,7 +111,7 @@ def _extras() -> list[Finding]:
 
 def _kernel_cache() -> Finding:
     """Compiled kernels are kept between runs only where the user may write."""
-    from ..sim.planar.march import march
+    from ..sim import march
 
     folder = march.cache_folder
     if folder:

@@ -18,7 +18,7 @@ from magbend.analysis.design.makeable import (
     dimension,
     rods,
 )
-from magbend.analysis.design.search import design
+from magbend.analysis.design.search import find_designs
 from magbend.core.errors import SolverError
 from magbend.sim import UniformField
 from magbend.sim.batch.shapes import solve_shapes
@@ -28,7 +28,9 @@ def main(targets: int) -> None:
     limits, rng = Makeable(), np.random.default_rng(2026)
     radius = goals.radius_goal(1.0)
     hits, all_five, wall, cpu = 0, 0, [], []
-    design(goals.radius_goal(100.0), UniformField(flux_mT=50.0), limits)  # warm-up
+    find_designs(
+        goals.radius_goal(100.0), UniformField(flux_mT=50.0), limits
+    )  # warm-up
     for _ in range(targets):
         z = rng.random((1, dimension(limits)))
         made = rods(limits, Candidates(z=z, choice=np.zeros(1, dtype=np.int64)))
@@ -37,7 +39,7 @@ def main(targets: int) -> None:
         wanted = float(goals.achieved(radius, shape)[0])
         start, start_cpu = time.perf_counter(), time.process_time()
         try:
-            found = design(goals.radius_goal(wanted), field, limits, count=5)
+            found = find_designs(goals.radius_goal(wanted), field, limits, count=5)
         except SolverError as error:
             print(f"missed {wanted:.4g} mm at {field.flux_mT:.3g} mT: {error}")
             found = []

@@ -26,7 +26,7 @@ import cv2
 import numpy as np
 
 from magbend.vision import Measurement, as_photo, draw_overlay, extract, read_photo
-from magbend.vision.synthetic.score import arc_length, signed_distance
+from magbend.vision.synthetic.scoring import arc_length, signed_distance
 
 
 def skeletons(folder: Path) -> dict[str, np.ndarray | None]:

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from magbend.vision import Board, calibrate, extract, read_photo
-from magbend.vision.synthetic.score import signed_distance
+from magbend.vision.synthetic.scoring import signed_distance
 
 FIXTURES = Path(__file__).parents[1] / "fixtures" / "vision" / "rendered"
 

@@ -36,8 +36,8 @@ from magbend.vision.synthetic import (
     render_scene,
     scene_camera,
 )
-from magbend.vision.synthetic.frames import curve
-from magbend.vision.synthetic.score import signed_distance
+from magbend.vision.synthetic.scoring import signed_distance
+from magbend.vision.synthetic.square_view import curve
 
 COLOURS = {"grey": GREY, "blue": BLUE, "black": BLACK}
 

@@ -23,8 +23,8 @@ from magbend.sim import gmc
 from magbend.vision import Calibration, Measurement, Pose, as_photo, extract
 from magbend.vision.batch.shared_clamp import Reading, shared_direction
 from magbend.vision.synthetic import Scene, render_scene
-from magbend.vision.synthetic.frames import curve
-from magbend.vision.synthetic.score import signed_distance
+from magbend.vision.synthetic.scoring import signed_distance
+from magbend.vision.synthetic.square_view import curve
 
 Shot = tuple[Measurement, np.ndarray, float]
 """A measurement, the true axis in the clamp's frame, mm, and the true direction."""

@@ -23,7 +23,7 @@ from bench_vision_peers import longest_path, rod_mask
 from skimage.morphology import skeletonize
 
 from magbend.vision import as_photo, extract, score
-from magbend.vision.synthetic.frames import frames
+from magbend.vision.synthetic.square_view import frames
 
 STAGES = {
     "binarise": "find.choose", "find_candidates": "find.choose",

@@ -21,7 +21,7 @@ import numpy as np
 
 from magbend.vision import Setting, extract, extract_files, read_photo
 from magbend.vision.batch.overlay import overlay_png
-from magbend.vision.synthetic.frames import LIGHTS, SHAPES, curve, draw
+from magbend.vision.synthetic.square_view import LIGHTS, SHAPES, curve, draw
 
 
 def write_frames(folder: Path, count: int):

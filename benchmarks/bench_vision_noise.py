@@ -19,8 +19,8 @@ import cv2
 import numpy as np
 
 from magbend.vision import as_photo, extract, score
-from magbend.vision.synthetic.frames import LIGHTS, SHAPES, Frame, curve, draw
-from magbend.vision.synthetic.score import signed_distance
+from magbend.vision.synthetic.scoring import signed_distance
+from magbend.vision.synthetic.square_view import LIGHTS, SHAPES, Frame, curve, draw
 
 INNER = slice(3, -3)
 

@@ -21,8 +21,8 @@ from skan import Skeleton
 from skimage.morphology import skeletonize
 
 from magbend.vision import as_photo, extract
-from magbend.vision.synthetic.frames import LIGHTS, SHAPES, Frame, curve, draw
-from magbend.vision.synthetic.score import arc_length, signed_distance
+from magbend.vision.synthetic.scoring import arc_length, signed_distance
+from magbend.vision.synthetic.square_view import LIGHTS, SHAPES, Frame, curve, draw
 
 Row = tuple[float, float, float, float, float]
 

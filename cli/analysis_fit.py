@@ -81,10 +81,10 @@ def fit(
         check_installed,
         common_support,
         fit_runs,
+        from_probe_reading,
         sample_posterior,
         write_fit,
     )
-    from ..analysis.paper.probe import from_probe_reading
     from ..core.derived import note_derived
     from ..sim import Support
 

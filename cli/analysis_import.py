@@ -11,7 +11,7 @@ from ..core.errors import InputError
 from .console import JSON, print_json, progress
 
 if TYPE_CHECKING:
-    from ..analysis.imports.run import ImportedRun
+    from ..analysis import ImportedRun
 
 UNIT = typer.Option("", "--unit", help="Unit of lengths in files of shapes: mm, m, um.")
 SCALE = typer.Option(None, "--mm-per-px", help="Scale of shapes in pixels.")

@@ -93,7 +93,7 @@ def predict(
     if gmc is not None and (E_MPa or lengths_mm or side_mm):
         raise InputError("give either --gmc or --E-MPa, --lengths-mm and --side-mm")
     if gmc is not None:
-        from ..analysis.expansion.data import inputs_of
+        from ..analysis import inputs_of
         from ..sim import gmc as rod
 
         inputs = inputs_of(rod(gmc, remeasured=True), flux_mT)

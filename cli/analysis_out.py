@@ -61,7 +61,7 @@ def export(
     unverified: bool = UNVERIFIED,
 ) -> None:
     """Export points, steps and comparisons for other programs."""
-    from ..analysis.compare.export import check_export, export_runs
+    from ..analysis import check_export, export_runs
 
     loaded, left_out = loaded_runs(runs, unverified=unverified)
     check_export(out)

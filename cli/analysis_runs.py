@@ -27,8 +27,7 @@ from .run_options import (
 )
 
 if TYPE_CHECKING:
-    from ..analysis.compare.compare import RunComparison
-    from ..analysis.runs.load import RunData
+    from ..analysis import RunComparison, RunData
 
 
 def register(app: typer.Typer) -> None:
@@ -59,8 +58,7 @@ def compare(
     json: bool = JSON,
 ) -> None:
     """Compare measured with simulated centrelines; write comparison.csv."""
-    from ..analysis import with_refitted
-    from ..analysis.compare.compare import check_any, comparison_table, write_comparison
+    from ..analysis import check_any, comparison_table, with_refitted, write_comparison
 
     choice(model, ("rod", "solid"), "--model")
     loaded, left_out = loaded_runs(runs, unverified=unverified)
@@ -96,9 +94,7 @@ def report(
     json: bool = JSON,
 ) -> None:
     """Write one self-contained HTML page, with the figures as PDF beside it."""
-    from ..analysis import try_fit
-    from ..analysis.compare.compare import write_comparison
-    from ..analysis.figures.several import gmc_numbers
+    from ..analysis import gmc_numbers, try_fit, write_comparison
     from ..analysis.report import write_report
 
     choice(model, ("rod", "solid"), "--model")
@@ -151,7 +147,7 @@ def paper(
     json: bool = JSON,
 ) -> None:
     """Run the paper's seven GMCs at three fields on the twin bench, and report."""
-    from ..analysis.paper.paper import reproduce
+    from ..analysis import reproduce
 
     with progress("paper") as tell:
         result = reproduce(out, seed=seed, workers=workers, progress=tell)
@@ -167,7 +163,7 @@ def audit(
     json: bool = JSON,
 ) -> None:
     """Check the paper's own numbers; one verdict each, computed here."""
-    from ..analysis.paper.audit import audit_paper, write_audit
+    from ..analysis import audit_paper, write_audit
 
     if out is not None:
         outputs(out)
@@ -195,7 +191,7 @@ def probe(
     json: bool = JSON,
 ) -> None:
     """Turn readings of a surface probe into remanences, by the stand-off."""
-    from ..analysis.paper.probe import (
+    from ..analysis import (
         fit_standoff,
         read_probe_csv,
         remanence_from_probe_mT,
@@ -232,7 +228,7 @@ def compared(
     load_factor: float = 1.0,
 ) -> list[RunComparison]:
     """Compare each run; add a sentence to `left_out` on each that cannot be."""
-    from ..analysis.compare.compare import compare_run
+    from ..analysis import compare_run
 
     done, errors = [], []
     with progress("compare") if len(loaded) > 4 else nullcontext(silent) as tell:

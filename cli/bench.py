@@ -40,7 +40,7 @@ def demo(
 
         open_demo(out, seed=seed, port=port, browser=not no_browser)
         return
-    from ..analysis.demo import run_demo
+    from ..analysis import run_demo
 
     report = run_demo(out, seed=seed, tell=typer.echo)
     typer.echo(str(report))
@@ -50,7 +50,7 @@ def doctor(
     as_json: bool = typer.Option(False, "--json", help="Print JSON for machines."),
 ) -> None:
     """Say what is installed, which ports and cameras answer, and what is missing."""
-    from ..analysis.doctor import as_dicts, examine
+    from ..analysis import as_dicts, examine
 
     findings = examine()
     if as_json:
@@ -69,7 +69,7 @@ def examples(
     out: Path = typer.Option(Path("magbend-examples"), "--out", help="Folder to fill."),
 ) -> None:
     """Copy the examples that come with the package: scripts, plans, rods, a library."""
-    from ..analysis.examples import copy_examples
+    from ..analysis import copy_examples
 
     for path in copy_examples(out):
         typer.echo(str(path))
@@ -84,7 +84,7 @@ def schema(
     ),
 ) -> None:
     """Print the JSON Schema of a TOML file, for editors that check while one types."""
-    from ..analysis.schemas import toml_schema, write_toml_schemas
+    from ..analysis import toml_schema, write_toml_schemas
 
     if out is not None:
         for path in write_toml_schemas(out):

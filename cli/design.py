@@ -11,10 +11,7 @@ from .analysis_import import ALIGN, FLIP, UNIT
 from .console import JSON, print_json
 
 if TYPE_CHECKING:
-    from ..analysis import Reading
-    from ..analysis.design.goals import Goal
-    from ..analysis.design.makeable import Makeable
-    from ..analysis.design.search import Design, Task
+    from ..analysis import Design, Goal, Makeable, Reading, Task
     from ..core.specimen import Specimen
     from ..sim import Field
 
@@ -181,7 +178,7 @@ def _one(fluxes_mT: list[float]) -> float | None:
 def _path(
     path: Path, angle_deg: float, magnet: Path | None, given: tuple[object, ...]
 ) -> list[Task]:
-    from ..analysis.design.path import read_path
+    from ..analysis import read_path
     from ..core.errors import InputError
     from ..core.specimen_file import read_magnet
 

@@ -10,8 +10,7 @@ import typer
 from .console import print_json, progress
 
 if TYPE_CHECKING:
-    from ..analysis.design.makeable import Makeable
-    from ..analysis.design.through import Through
+    from ..analysis import Makeable, Through
     from ..sim import Field
 
 
@@ -29,7 +28,7 @@ def design_lumen(
     as_json: bool,
 ) -> None:
     """Find rods that pass the lumen of a file, print them, write them."""
-    from ..analysis.design.through import design_through
+    from ..analysis import design_through
     from ..core.errors import InputError
     from ..sim.navigate import read_lumen
 

@@ -13,7 +13,7 @@ from ..core.errors import RigError
 from .keyboard import END, Keyboard, has_keys
 
 if TYPE_CHECKING:
-    from ..rig.stage.gap import GapStage
+    from ..rig import GapStage
 
 STEPS_MM = {"1": 0.1, "2": 0.5, "3": 1.0, "4": 5.0, "5": 10.0}
 FARTHER = {"up", "right", "+", "k"}
@@ -97,7 +97,7 @@ def _go(stage: GapStage, way_mm: float) -> None:
 @contextlib.contextmanager
 def _space_stops(stage: GapStage, keyboard: Keyboard) -> Iterator[None]:
     """While the stage moves, a space bar (or q, or Ctrl-C) asks it to stop."""
-    from ..rig.interrupts import interrupts
+    from ..rig import heed_interrupts
 
     done = threading.Event()
 
@@ -109,7 +109,7 @@ def _space_stops(stage: GapStage, keyboard: Keyboard) -> Iterator[None]:
     watcher = threading.Thread(target=watch, daemon=True)
     watcher.start()
     try:
-        with interrupts(stage.request_stop) as received, received.striking():
+        with heed_interrupts(stage.request_stop) as received, received.striking():
             yield
     finally:
         done.set()

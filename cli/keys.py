@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from .keyboard import END, Keyboard, has_keys
 
 if TYPE_CHECKING:
-    from ..rig.runs.control import RunControl
+    from ..rig import RunControl
 
 _POLL_S = 0.1
 

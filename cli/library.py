@@ -41,8 +41,8 @@ def build(
     """Solve a design space into Parquet; go on where an earlier build stopped."""
     from dataclasses import asdict
 
+    from ..analysis import read_space
     from ..analysis.library import build as builder
-    from ..analysis.library.space import read_space
 
     what = read_space(space)
     kept = f"{out} keeps the finished partitions; the same command goes on from there"
@@ -87,9 +87,8 @@ def query(
     as_json: bool = JSON,
 ) -> None:
     """Search a library: conditions, nearest shape, sort, the best few."""
-    from ..analysis import Reading, read_shape
+    from ..analysis import Reading, ask, read_shape
     from ..analysis.library import query as searching
-    from ..analysis.library.sql import ask
     from ..core.errors import InputError
     from ..core.files import output_file
 
@@ -131,7 +130,7 @@ def query(
 
 
 def _show_sql(table: Any, out: Path | None, as_json: bool) -> None:
-    from ..analysis.library.query import write_table
+    from ..analysis import write_table
 
     if out is not None:
         write_table(table, out)

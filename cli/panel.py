@@ -76,7 +76,7 @@ def open_demo(out: Path, *, seed: int, port: int, browser: bool) -> None:
 
 def _warm() -> None:
     """Compile the kernels first: while they compile, a page would wait for its stop."""
-    from ..analysis.warm_up import main
+    from ..analysis import main
 
     main(lambda text: typer.echo(text.rstrip(), err=True))
 

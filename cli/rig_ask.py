@@ -11,7 +11,7 @@ import typer
 from .console import print_json
 
 if TYPE_CHECKING:
-    from ..rig.stage.config import StageConfig
+    from ..rig import StageConfig
 
 RigOption = Annotated[Path, typer.Option("--rig", help="The rig file.")]
 PortOption = Annotated[
@@ -33,8 +33,7 @@ def stop(rig: RigOption = RIG, port: PortOption = None) -> None:
 
     A run or command that holds the bench is told, and holds the stage.
     """
-    from ..rig.clock import SystemClock
-    from ..rig.stage.stop_request import stop_from_outside
+    from ..rig import SystemClock, stop_from_outside
 
     typer.echo(stop_from_outside(rig, stage_table(rig, port), SystemClock()))
 

@@ -104,7 +104,7 @@ def open_bench(
                 ask=asker(plan) if asks_flux(plan, readings_mT) else None,
             )  # fmt: skip
         else:
-            from ..analysis.twin.run import keep_board, open_twin_bench
+            from ..analysis import keep_board, open_twin_bench
 
             bench, devices = open_twin_bench(plan, seed=twin_seed, clock=clock, log=log)
         owner.commands["stop"] = stopping(devices.stage)

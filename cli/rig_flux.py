@@ -14,7 +14,7 @@ from .console import print_json
 from .keys import answering
 
 if TYPE_CHECKING:
-    from ..analysis.runs.witness import FieldWitness
+    from ..analysis import FieldWitness
     from ..rig import Plan
 
 EXAMPLE = "Example: magbend rig amend-flux runs/gmc2 --step 2 --flux-mT 38"
@@ -27,7 +27,7 @@ def register(app: typer.Typer) -> None:
 
 def asker(plan: Plan) -> Callable[[float], float | None]:
     """Return what asks for the reading at a gap, and doubts it at once."""
-    from ..analysis.runs.witness import witness_of
+    from ..analysis import witness_of
 
     witness, earlier = witness_of(plan), list[tuple[float, float]]()
 
@@ -92,7 +92,7 @@ def require_plausible(plan: Plan, readings_mT: dict[float, float]) -> None:
     InputError
         If a unit slipped, two readings were exchanged, or no magnet is so strong.
     """
-    from ..analysis.runs.witness import witness_of
+    from ..analysis import witness_of
 
     witness, earlier = witness_of(plan), list[tuple[float, float]]()
     for gap_mm, flux_mT in readings_mT.items():
@@ -118,7 +118,7 @@ def amend(
     The records of the run stay as they are; amendments.jsonl says what was corrected,
     when, by whom and why, and every reader takes the corrected value.
     """
-    from ..rig.runs.amend import amend_flux
+    from ..rig import amend_flux
 
     record = amend_flux(
         run, step - 1, flux_mT, reason=reason, witness=_witness_of_run(run)
@@ -134,7 +134,7 @@ def amend(
 
 
 def _witness_of_run(run: Path) -> FieldWitness:
-    from ..analysis.runs.witness import FieldWitness
+    from ..analysis import FieldWitness
     from ..core.specimen_file import MagnetModel
     from ..rig import read_run
 

@@ -13,7 +13,7 @@ from .rig_ask import RIG, PortOption, RigOption, stage_table
 from .rig_stage import LogOption, connected, facts, line
 
 if TYPE_CHECKING:
-    from ..rig.stage.gap import GapStage
+    from ..rig import GapStage
 
 EXAMPLE = "Example: magbend rig set-gap 70.2 --rig rig.toml"
 _TEST_MM = 1.0

@@ -18,10 +18,7 @@ from .rig_flux import require_plausible
 from .rig_show import print_dry_run, print_scan, print_summary
 
 if TYPE_CHECKING:
-    from ..rig.bench.config import Plan
-    from ..rig.bench.devices import Devices
-    from ..rig.runs.control import RunControl
-    from ..rig.runs.runner import RunSummary
+    from ..rig import Devices, Plan, RunControl, RunSummary
 
 RUN_EXAMPLE = "Example: magbend rig run plan.toml --out runs/gmc2"
 VERIFY_EXAMPLE = "Example: magbend rig verify runs/gmc2"
@@ -94,7 +91,7 @@ def run(
     the signal USR1 and magbend rig pause. What was recorded stays: --resume homes the
     stage, checks its position and takes the missing steps.
     """
-    from ..rig.bench.config import read_plan
+    from ..rig import read_plan
 
     checked = read_plan(plan)
     if dry_run:
@@ -179,14 +176,14 @@ def scan_field(
     with two good readings or more and a magnet in the rig file, field.svg and the
     remanence.
     """
-    from ..rig.bench.config import read_plan
+    from ..rig import read_plan
 
     checked = read_plan(plan)
     gaps = tuple(_numbers(gaps_mm, "--gaps-mm")) if gaps_mm else checked.gaps_mm
     folder = out or Path("scans") / _dated_name(checked)
     readings_mT = _readings_mT(flux_mT, gaps)
     twin_seed = _twin_seed(checked, twin, seed, readings_mT)
-    from ..rig.runs.scan_field import scan_field as scan
+    from ..rig import scan_field as scan
 
     with (
         open_bench(checked, folder, readings_mT, twin_seed, camera=False) as devices,
@@ -206,7 +203,7 @@ def init(
     ] = False,
 ) -> None:
     """Write commented rig, plan and specimen files."""
-    from ..rig.bench.template import write_templates
+    from ..rig import write_templates
 
     for path in write_templates(folder, twin=twin):
         typer.echo(str(path))
@@ -228,7 +225,7 @@ def _report_twin(line: str) -> None:
 
 def _run_folder(plan: Plan, out: Path | None, resume: bool) -> Path:
     """Return where the run goes; refuse to touch one that is there."""
-    from ..rig.runs.read import is_run
+    from ..rig import is_run
 
     if out is None and resume:
         raise InputError(
@@ -307,9 +304,9 @@ def _carry_out(
     live_port: int | None,
     speed: float | None,
 ) -> RunSummary:
-    from ..analysis.runs.witness import witness_of
-    from ..rig.runs.control import RunControl
-    from ..rig.runs.runner import run as carry_out
+    from ..analysis import witness_of
+    from ..rig import RunControl
+    from ..rig import run as carry_out
     from .keys import pausing, terminating
 
     control = RunControl()
@@ -346,7 +343,7 @@ def _watching(
     if port is None:
         yield say
         return
-    from ..rig.camera.live_view import LiveStatus, Watched, live_view
+    from ..rig import LiveStatus, Watched, live_view
 
     if not isinstance(devices.camera, Watched):
         raise InputError("--live-port needs a camera or stream; files are not watched")

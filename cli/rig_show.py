@@ -10,19 +10,17 @@ from ..core.errors import RigError
 from .console import print_json
 
 if TYPE_CHECKING:
-    from ..rig.bench.config import Plan
-    from ..rig.runs.runner import RunSummary
-    from ..rig.runs.scan_field import FieldScan
+    from ..rig import FieldScan, Plan, RunSummary
 
 
 def print_dry_run(plan: Plan, as_json: bool) -> None:
     """Print the steps of a plan with what the simulator expects at each."""
-    from ..rig.runs.dry_run import homing_s, plan_steps
+    from ..rig import homing_s, plan_steps
 
     steps = plan_steps(plan)
     previews: dict[int, Any] = {}
     if plan.rig.magnet is not None:
-        from ..analysis.twin.plan_preview import preview_plan
+        from ..analysis import preview_plan
 
         magnet = plan.rig.magnet.magnet()
         found = preview_plan(
@@ -68,7 +66,7 @@ def print_dry_run(plan: Plan, as_json: bool) -> None:
     if plan.rig.magnet is not None:
         typer.echo(_weight(plan))
     if plan.rig.stage.gap_at_zero_mm is None:
-        from ..rig.stage.gap import NEVER_MEASURED
+        from ..rig import NEVER_MEASURED
 
         typer.echo(f"note: {NEVER_MEASURED}")
     typer.echo(
@@ -147,7 +145,7 @@ def print_scan(
     }
     lines = [str(found.path), *(f"no reading at {line}" for line in found.skipped)]
     if plan.rig.magnet is not None and len(found.gaps_mm) >= 2:
-        from ..analysis.runs.field_scan import judge_scan
+        from ..analysis import judge_scan
 
         judged = judge_scan(
             found.path, found.gaps_mm, found.flux_mT, found.sd_mT,

@@ -64,9 +64,15 @@ def _take(rig: Path, table: Any, out: Path, frames: int) -> dict[str, Any]:
     import contextlib
 
     from ..core.files import write_bytes
-    from ..rig import SystemClock, open_camera
-    from ..rig.camera.photo_flags import photo_flags
-    from ..rig.camera.protocol import brightness, encode_png, grab_median, sharpness
+    from ..rig import (
+        SystemClock,
+        brightness,
+        encode_png,
+        grab_median,
+        open_camera,
+        photo_flags,
+        sharpness,
+    )
 
     clock = SystemClock()
     with contextlib.closing(

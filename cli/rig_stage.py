@@ -23,7 +23,7 @@ from .rig_ask import (
 from .rig_ask import watch as watch_owner
 
 if TYPE_CHECKING:
-    from ..rig.stage.gap import GapStage
+    from ..rig import GapStage
 
 LogOption = Annotated[
     Path | None, typer.Option("--log", help="Append every byte to this file.")
@@ -48,7 +48,7 @@ def ports(as_json: JsonOption = False) -> None:
     """List the serial ports of this machine."""
     import dataclasses
 
-    from ..rig.ports import list_ports
+    from ..rig import list_ports
 
     found = list_ports()
     if as_json:
@@ -202,9 +202,8 @@ def twin(
     """
     import time
 
-    from ..rig.clock import SystemClock
-    from ..rig.virtual.board.file import load_board, save_board
-    from ..rig.virtual.pty_server import PtyBoard
+    from ..rig import SystemClock
+    from ..rig.virtual import PtyBoard, load_board, save_board
 
     played = load_board(state, board)
     with PtyBoard(played, SystemClock()) as served:
@@ -254,10 +253,9 @@ def connected(
 def _told_how_to_go_on(stage: GapStage) -> Iterator[None]:
     """Let Ctrl-C stop the stage, and say what its position is worth then."""
     from ..core.errors import RigError
-    from ..rig.errors import StoppedError
-    from ..rig.interrupts import interrupts
+    from ..rig import StoppedError, heed_interrupts
 
-    with interrupts(stage.request_stop) as received:
+    with heed_interrupts(stage.request_stop) as received:
         try:
             with received.striking():
                 yield

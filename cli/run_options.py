@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 if TYPE_CHECKING:
-    from ..analysis.runs.load import RunData
+    from ..analysis import RunData
     from ..sim import Support
 
 RUNS = typer.Argument(..., help="Run folders, or folders of runs.")
@@ -30,7 +30,7 @@ def loaded_runs(
     paths: Sequence[Path], *, unverified: bool
 ) -> tuple[list[RunData], list[str]]:
     """Return the runs that can be read, and a sentence on each that cannot."""
-    from ..analysis.runs.load import load_runs
+    from ..analysis import load_runs
 
     loaded, left_out = load_runs(paths, unverified=unverified)
     for run in loaded:

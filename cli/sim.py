@@ -14,8 +14,7 @@ from .sim_case import field_of, rod_of
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
-    from ..sim.fields import Field, Support
-    from ..sim.solution import Solution
+    from ..sim import Field, Solution, Support
 
 app = group(
     "sim",
@@ -80,8 +79,7 @@ def shape(
     """Predict the shape of a rod in a uniform field or before a magnet."""
     from ..core.files import output_file
     from ..core.jit import once
-    from ..sim.fields import Support
-    from ..sim.one_rod import solve
+    from ..sim import Support, solve
 
     rod = _specimen(gmc, specimen, remeasured, density_kg_m3)
     field = _field(field_mT, angle_deg, magnet, gap_mm)
@@ -163,7 +161,7 @@ def _check(
 ) -> float:
     if model != "rod":
         raise typer.BadParameter("--verify belongs to --model rod")
-    from ..sim.check.solver import verify
+    from ..sim import verify
 
     return verify(rod, field, solution, support=support)
 

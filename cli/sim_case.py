@@ -9,7 +9,7 @@ import typer
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
-    from ..sim.fields import Field
+    from ..sim import Field
 
 
 def rod_of(gmc: int | None, file: Path | None, remeasured: bool = False) -> Specimen:
@@ -23,7 +23,7 @@ def rod_of(gmc: int | None, file: Path | None, remeasured: bool = False) -> Spec
     if (gmc is None) == (file is None):
         raise typer.BadParameter("give either --gmc 1..7 or --specimen FILE")
     if gmc is not None:
-        from ..sim.table1 import gmc as table1
+        from ..sim import gmc as table1
 
         return table1(gmc, remeasured=remeasured)
     if remeasured:
@@ -48,10 +48,10 @@ def field_of(
     if flux_mT is not None:
         if gap_mm is not None:
             raise typer.BadParameter("--gap-mm belongs to --magnet")
-        from ..sim.fields import UniformField
+        from ..sim import UniformField
 
         return UniformField(flux_mT=flux_mT, angle_deg=angle_deg)
-    from ..sim.sources import read_field
+    from ..sim import read_field
 
     field = read_field(Path(str(file)))
     if gap_mm is None:

@@ -12,8 +12,7 @@ from .sim_case import field_of, rod_of
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
-    from ..sim.equilibria.find import Equilibrium
-    from ..sim.equilibria.folds import Branch, Fold
+    from ..sim.equilibria import Branch, Equilibrium, Fold
 
 EXAMPLE = (
     "Example: magbend sim equilibria --gmc 2 --field-mT 500 --angle-deg 150 --fold"
@@ -56,9 +55,8 @@ def equilibria(
     """Find every planar equilibrium of a weightless rod, stable or not."""
     from ..core.files import output_file
     from ..core.jit import once
-    from ..sim.equilibria.find import find_equilibria
-    from ..sim.equilibria.folds import trace_branches
-    from ..sim.fields import Support
+    from ..sim import Support
+    from ..sim.equilibria import find_equilibria, trace_branches
 
     rod = rod_of(gmc, specimen, remeasured)
     if magnet is None and field_mT is None:
@@ -76,7 +74,7 @@ def equilibria(
     if fold or figure is not None:
         branches = once(lambda: trace_branches(rod, field, support=support))
     if figure is not None:
-        from ..sim.study.equilibria_figure import draw_equilibria
+        from ..sim import draw_equilibria
 
         title = f"{rod.name}, {field_mT or 0.0:g} mT at {angle_deg:g} deg"
         draw_equilibria(figure, found, branches, title=title)

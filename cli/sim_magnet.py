@@ -10,7 +10,7 @@ import typer
 from .console import print_json
 
 if TYPE_CHECKING:
-    from ..sim.magnet.fit import MagnetFit
+    from ..sim import MagnetFit
 
 EXAMPLE = "Example: magbend sim magnet readings.csv --map field.svg"
 STRONGEST_T = 1.5
@@ -38,8 +38,7 @@ def magnet(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Fit a magnet's remanence to readings on its axis, and judge each reading."""
-    from ..sim.magnet.fit import fit_magnet
-    from ..sim.magnet.readings import paper_readings, read_readings
+    from ..sim import fit_magnet, paper_readings, read_readings
 
     sides = sides_mm or (side_mm, side_mm, side_mm)
     printed: list[dict[str, float]] = []
@@ -69,7 +68,7 @@ def magnet(
     )
     if field_map is not None:
         from ..core.files import output_file
-        from ..sim.study.figures import draw_field_map
+        from ..sim import draw_field_map
 
         output_file(field_map)
         draw_field_map(field_map, sides_mm=sides, remanence_T=fit.remanence_T)

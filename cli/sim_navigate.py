@@ -12,7 +12,7 @@ from .sim_case import field_of, rod_of
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
-    from ..sim.fields import Field
+    from ..sim import Field
     from ..sim.navigate import Lumen, Passage
 
 EXAMPLE = (

@@ -11,7 +11,7 @@ from .console import print_json
 from .sim_case import field_of, rod_of
 
 if TYPE_CHECKING:
-    from ..sim.path.follow import Path as Followed
+    from ..sim import Path as Followed
 
 EXAMPLE = (
     "Example: magbend sim path --specimen S.toml --magnet M.toml --gap-mm 120:30:120"
@@ -67,8 +67,7 @@ def path(
 ) -> None:
     """Follow a rod quasi-statically through folds, snaps and back."""
     from ..core.files import output_file
-    from ..sim import Support
-    from ..sim.path.follow import follow_path
+    from ..sim import Support, follow_path
 
     given = {
         "gap_mm": gap_mm, "flux_mT": field_mT, "angle_deg": angle_deg,
@@ -124,15 +123,15 @@ def _write(
 ) -> None:
     if out is not None:
         from ..core.files import write_text
-        from ..sim.path.draw import path_csv
+        from ..sim import path_csv
 
         write_text(out, path_csv(found))
     if figure is not None:
-        from ..sim.path.draw import draw_path
+        from ..sim import draw_path
 
         draw_path(figure, found, title=name)
     if animation is not None:
-        from ..sim.path.draw import animate_path
+        from ..sim import animate_path
 
         animate_path(animation, found, title=name)
 

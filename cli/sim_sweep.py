@@ -45,11 +45,9 @@ def sweep(
     if values is not None and len(names) != 1:
         raise typer.BadParameter("--values belongs to one study: name it")
     from ..core.files import output_folder, write_text
-    from ..sim.fields import UniformField
-    from ..sim.study.figures import draw_study
-    from ..sim.study.sweep import STUDIES, sweep_csv
-    from ..sim.study.sweep import sweep as solve_study
-    from ..sim.table1 import gmc as table1
+    from ..sim import STUDIES, UniformField, draw_study, sweep_csv
+    from ..sim import gmc as table1
+    from ..sim import sweep as solve_study
 
     if specimen is None:
         rod = table1(gmc)

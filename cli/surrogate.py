@@ -40,8 +40,8 @@ def predict(
     from ..core.errors import InputError
     from ..core.files import output_file
     from ..core.specimen_file import read_specimen
+    from ..sim import designs_of
     from ..sim import gmc as table_1
-    from ..sim.batch.shapes import designs_of
 
     if (gmc is None) == (specimen is None):
         raise InputError("give either --gmc or --specimen")

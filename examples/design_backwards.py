@@ -10,9 +10,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-from magbend.analysis.design.goals import radius_goal
-from magbend.analysis.design.makeable import Makeable
-from magbend.analysis.design.search import Design, design
+from magbend.analysis import Design, Makeable, find_designs, radius_goal
 from magbend.sim import UniformField, solve
 
 RADIUS_MM, FIELD = 60.0, UniformField(flux_mT=60.0)
@@ -20,7 +18,7 @@ RADIUS_MM, FIELD = 60.0, UniformField(flux_mT=60.0)
 
 def main(folder: Path) -> list[Design]:
     """Draw five rods that bend to the wanted radius; return them, the best first."""
-    found = design(radius_goal(RADIUS_MM), FIELD, Makeable(), count=5)
+    found = find_designs(radius_goal(RADIUS_MM), FIELD, Makeable(), count=5)
     figure, axes = plt.subplots(figsize=(6.0, 3.2), layout="constrained")
     for number, one in enumerate(found, start=1):
         line = solve(one.specimen, FIELD).centreline

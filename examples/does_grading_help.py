@@ -25,9 +25,9 @@ from magbend.sim.navigate import (
     Wall,
     channel,
     navigate,
+    outline,
     polyline,
 )
-from magbend.sim.navigate.curves import outline
 
 NOTHING = UniformField(flux_mT=0.0)
 FRICTION = 0.2

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-from magbend.vision import Board, calibrate, extract, read_photo
-from magbend.vision.measurement import Measurement
+from magbend.vision import Board, Measurement, calibrate, extract, read_photo
 
 PHOTOGRAPHS = Path(__file__).resolve().parents[1] / "fixtures" / "vision" / "rendered"
 ROD, AXIS_HEIGHT_MM = PHOTOGRAPHS / "dev_10.jpg", 0.9

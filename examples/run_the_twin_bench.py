@@ -12,8 +12,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-from magbend.analysis import compare_run, load_run
-from magbend.analysis.twin.run import bench_run
+from magbend.analysis import bench_run, compare_run, load_run
 from magbend.sim import gmc
 
 SEED = 2

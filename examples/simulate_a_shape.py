@@ -10,8 +10,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-from magbend.analysis.compare.compare import uniform_rod
-from magbend.analysis.compare.metrics import circularity
+from magbend.analysis import circularity, uniform_rod
 from magbend.core.centreline import Centreline
 from magbend.core.specimen import Specimen
 from magbend.sim import UniformField, gmc, solve

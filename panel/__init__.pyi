@@ -7,10 +7,10 @@ from .demo import (
 from .panel import (
     Panel as Panel,
 )
-from .serve import (
+from .server import (
     Address as Address,
 )
-from .serve import (
+from .server import (
     serve as serve,
 )
 from .workspace import (

@@ -24,7 +24,7 @@ def prepare_demo(folder: Path, *, seed: int) -> Path:
     StoreError
         If the folder cannot be written.
     """
-    from ..analysis.twin.run import open_twin_bench
+    from ..analysis import open_twin_bench
     from ..rig import SteppedClock, write_templates
     from ..vision import as_photo, calibrate, write_calibration
 

@@ -1,4 +1,7 @@
 from .bench.config import (
+    BenchModel as BenchModel,
+)
+from .bench.config import (
     Plan as Plan,
 )
 from .bench.config import (
@@ -12,6 +15,9 @@ from .bench.config import (
 )
 from .bench.devices import (
     Devices as Devices,
+)
+from .bench.devices import (
+    closing_all as closing_all,
 )
 from .bench.measured import (
     keep_measured_gap as keep_measured_gap,
@@ -37,11 +43,32 @@ from .camera.capture import (
 from .camera.config import (
     CameraConfig as CameraConfig,
 )
+from .camera.live_view import (
+    LiveStatus as LiveStatus,
+)
+from .camera.live_view import (
+    Watched as Watched,
+)
+from .camera.live_view import (
+    live_view as live_view,
+)
+from .camera.photo_flags import (
+    photo_flags as photo_flags,
+)
 from .camera.protocol import (
     Image as Image,
 )
 from .camera.protocol import (
+    brightness as brightness,
+)
+from .camera.protocol import (
     encode_png as encode_png,
+)
+from .camera.protocol import (
+    grab_median as grab_median,
+)
+from .camera.protocol import (
+    sharpness as sharpness,
 )
 from .clock import (
     Check as Check,
@@ -74,6 +101,9 @@ from .errors import NotStoppedError as NotStoppedError
 from .errors import PositionLostError as PositionLostError
 from .errors import StageTimeoutError as StageTimeoutError
 from .errors import StoppedError as StoppedError
+from .interrupts import (
+    heed_interrupts as heed_interrupts,
+)
 from .link import (
     Link as Link,
 )
@@ -104,6 +134,9 @@ from .ports import (
 from .ports import (
     resolve_port as resolve_port,
 )
+from .runs.amend import (
+    amend_flux as amend_flux,
+)
 from .runs.control import RunControl as RunControl
 from .runs.documents import (
     documents_of as documents_of,
@@ -116,6 +149,9 @@ from .runs.dry_run import (
 )
 from .runs.dry_run import (
     plan_steps as plan_steps,
+)
+from .runs.folder import (
+    RunFolder as RunFolder,
 )
 from .runs.migrate import migrate_run as migrate_run
 from .runs.nexus import (
@@ -130,11 +166,26 @@ from .runs.read import (
 from .runs.read import (
     read_run as read_run,
 )
+from .runs.records import (
+    SCHEMA as SCHEMA,
+)
+from .runs.records import (
+    sha256_of as sha256_of,
+)
+from .runs.records import (
+    utc_now as utc_now,
+)
 from .runs.runner import (
     RunSummary as RunSummary,
 )
 from .runs.runner import (
     run as run,
+)
+from .runs.scan_field import (
+    FieldScan as FieldScan,
+)
+from .runs.scan_field import (
+    scan_field as scan_field,
 )
 from .runs.verify import (
     RunCheck as RunCheck,
@@ -148,11 +199,20 @@ from .runs.verify import (
 from .runs.verify import (
     verify_run as verify_run,
 )
+from .runs.witness import (
+    FieldDoubt as FieldDoubt,
+)
+from .runs.witness import (
+    Reading as Reading,
+)
 from .stage.config import (
     LimitsConfig as LimitsConfig,
 )
 from .stage.config import (
     StageConfig as StageConfig,
+)
+from .stage.gap import (
+    NEVER_MEASURED as NEVER_MEASURED,
 )
 from .stage.gap import (
     GapStage as GapStage,
@@ -186,6 +246,9 @@ from .stage.protocol import (
 )
 from .stage.protocol import (
     StageLimits as StageLimits,
+)
+from .stage.stop_request import (
+    stop_from_outside as stop_from_outside,
 )
 from .stage.stop_request import stopping as stopping
 from .wire_log import WireLog as WireLog

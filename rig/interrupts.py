@@ -24,7 +24,7 @@ class StopAtOnce(KeyboardInterrupt):
 
 
 class Interrupts:
-    """What Ctrl-C, SIGTERM and a closed terminal ask for; made by `interrupts`.
+    """What Ctrl-C, SIGTERM and a closed terminal ask for; made by `heed_interrupts`.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Interrupts:
 
 
 @contextlib.contextmanager
-def interrupts(ask: Callable[[], None]) -> Iterator[Interrupts]:
+def heed_interrupts(ask: Callable[[], None]) -> Iterator[Interrupts]:
     """Turn the first Ctrl-C, SIGTERM or SIGHUP of this block into a call of `ask`.
 
     Parameters

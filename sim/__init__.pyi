@@ -1,3 +1,12 @@
+from . import (
+    navigate as navigate,
+)
+from .batch.shapes import (
+    ROWS_PER_CALL as ROWS_PER_CALL,
+)
+from .batch.shapes import (
+    STATUS as STATUS,
+)
 from .batch.shapes import (
     Designs as Designs,
 )
@@ -9,6 +18,12 @@ from .batch.shapes import (
 )
 from .batch.shapes import (
     solve_shapes as solve_shapes,
+)
+from .batch.threads import (
+    cores as cores,
+)
+from .batch.threads import (
+    in_threads as in_threads,
 )
 from .batch.tips import (
     solve_many as solve_many,
@@ -53,6 +68,12 @@ from .magnet.fit import (
     ReadingVerdict as ReadingVerdict,
 )
 from .magnet.fit import (
+    axis_flux_by_integral_mT as axis_flux_by_integral_mT,
+)
+from .magnet.fit import (
+    axis_share as axis_share,
+)
+from .magnet.fit import (
     fit_magnet as fit_magnet,
 )
 from .magnet.map import (
@@ -65,10 +86,22 @@ from .magnet.map import (
     sampled_map as sampled_map,
 )
 from .magnet.readings import (
+    paper_readings as paper_readings,
+)
+from .magnet.readings import (
     read_readings as read_readings,
 )
 from .one_rod import (
     solve as solve,
+)
+from .path.draw import (
+    animate_path as animate_path,
+)
+from .path.draw import (
+    draw_path as draw_path,
+)
+from .path.draw import (
+    path_csv as path_csv,
 )
 from .path.follow import (
     Path as Path,
@@ -81,6 +114,9 @@ from .path.follow import (
 )
 from .path.follow import (
     follow_path as follow_path,
+)
+from .planar.march import (
+    march as march,
 )
 from .probe import (
     flux_mT as flux_mT,
@@ -139,8 +175,23 @@ from .spatial.solver import (
 from .spatial.solver import (
     solve_spatial as solve_spatial,
 )
+from .study.equilibria_figure import (
+    draw_equilibria as draw_equilibria,
+)
+from .study.figures import (
+    draw_field_map as draw_field_map,
+)
+from .study.figures import (
+    draw_study as draw_study,
+)
+from .study.sweep import (
+    STUDIES as STUDIES,
+)
 from .study.sweep import (
     sweep as sweep,
+)
+from .study.sweep import (
+    sweep_csv as sweep_csv,
 )
 from .table1 import (
     gmc as gmc,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
 import tomllib
@@ -9,6 +10,7 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 import pytest
+from house import PACKAGES, circles, file_graph, room_graph
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -92,3 +94,26 @@ def test_the_constraints_pin_every_dependency() -> None:
         line.split("==")[0].lower().replace("_", "-") for line in lines if "==" in line
     }
     assert names <= pinned
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_no_rooms_import_each_other_in_a_circle(package: str) -> None:
+    assert circles(room_graph(package)) == []
+    assert circles(file_graph(package)) == []
+
+
+@pytest.mark.parametrize("stub", sorted(ROOT.glob("[a-z]*/**/__init__.pyi")), ids=str)
+def test_no_name_of_a_face_hides_a_room(stub: Path) -> None:
+    # Importing the room would put the module in the name's place.
+    if "build" in stub.parts or ".venv" in stub.parts:
+        return
+    tree = ast.parse(stub.read_text(encoding="utf-8"))
+    names = {
+        name.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and node.module
+        for name in node.names
+    }
+    rooms = {path.stem for path in stub.parent.glob("*.py")}
+    rooms |= {path.parent.name for path in stub.parent.glob("*/__init__.py")}
+    assert names & rooms == set()

@@ -29,6 +29,9 @@ from .batch.run import (
     is_made_by_us as is_made_by_us,
 )
 from .batch.tables import (
+    Done as Done,
+)
+from .batch.tables import (
     FrameRow as FrameRow,
 )
 from .batch.tables import (
@@ -36,6 +39,12 @@ from .batch.tables import (
 )
 from .batch.tables import (
     read_frames as read_frames,
+)
+from .batch.tables import (
+    write_centrelines as write_centrelines,
+)
+from .batch.tables import (
+    write_frames as write_frames,
 )
 from .camera.board import (
     Board as Board,
@@ -115,9 +124,12 @@ from .picture.photo import (
 from .picture.photo import (
     read_photo as read_photo,
 )
-from .synthetic.score import (
+from .picture.srgb import (
+    encode_srgb as encode_srgb,
+)
+from .synthetic.scoring import (
     Score as Score,
 )
-from .synthetic.score import (
+from .synthetic.scoring import (
     score as score,
 )

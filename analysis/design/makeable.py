@@ -20,9 +20,8 @@ from ...core.errors import InputError
 from ...core.magnet import Magnet
 from ...core.specimen import Section, Specimen
 from ...core.toml import FileModel
+from ...sim import Designs, MagnetField, UniformField
 from ...sim import Field as LoadField
-from ...sim import MagnetField, UniformField
-from ...sim.batch.shapes import Designs
 from ..shapes.feasible import falling_moduli, fitting_lengths
 
 Array = NDArray[np.float64]

@@ -24,8 +24,7 @@ from ...core.errors import SolverError
 from ...core.notebook import Tabular, axes_or_new
 from ...core.specimen import Specimen
 from ...core.specimen_file import specimen_dict
-from ...sim import Field, solve
-from ...sim.batch.shapes import solve_shapes
+from ...sim import Field, solve, solve_shapes
 from ..library.space import sobol_points
 from . import goals
 from .goals import Goal
@@ -130,7 +129,7 @@ class Design(Tabular):
         return ax
 
 
-def design(
+def find_designs(
     goal: Goal, field: Field, makeable: Makeable, *, count: int = 5, seed: int = 0
 ) -> list[Design]:
     """Return up to `count` distinct designs that meet a goal, best first.

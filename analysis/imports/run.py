@@ -30,11 +30,9 @@ from ...core.owned import owning_folder
 from ...core.specimen import Specimen
 from ...core.specimen_file import MagnetModel, read_specimen, specimen_dict
 from ...core.toml import read_toml
-from ...rig.runs.folder import RunFolder
-from ...rig.runs.records import SCHEMA, sha256_of, utc_now
-from ...sim.magnet.fit import axis_share
-from ...vision import read_calibration
-from ...vision.batch.tables import Done, FrameRow, write_centrelines, write_frames
+from ...rig import SCHEMA, RunFolder, sha256_of, utc_now
+from ...sim import axis_share
+from ...vision import Done, FrameRow, read_calibration, write_centrelines, write_frames
 from ..runs import imported
 from .door import read_shape
 from .judge import Reading, Shape

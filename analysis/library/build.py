@@ -32,11 +32,10 @@ from ...core.files import write_bytes
 from ...core.json import read_json, write_json
 from ...core.owned import MARK, owning_folder
 from ...core.progress import Progress, silent
-from ...sim.batch import ROWS_PER_CALL, cores
-from ...sim.batch.shapes import STATUS, Designs, solve_shapes
+from ...sim import ROWS_PER_CALL, STATUS, Designs, cores, solve_shapes
 from ..shapes import descriptors
 from .ledger import SPACE_KEY, Ledger, is_sound
-from .space import Space
+from .space import Space, input_columns
 
 Columns = dict[str, NDArray]
 
@@ -195,23 +194,6 @@ def describe_designs(designs: Designs, more: Sequence[str] = ()) -> Columns:
         columns[f"y{percent}_mm"] = at[:, 2].astype(np.float32)
     columns["error_mm"] = solved.error_mm.astype(np.float32)
     columns["status"] = solved.status
-    return columns
-
-
-def input_columns(designs: Designs) -> Columns:
-    """Return the columns of a library that say what was solved."""
-    columns: Columns = {}
-    for i in range(designs.length_mm.shape[1]):
-        columns[f"length{i + 1}_mm"] = designs.length_mm[:, i]
-    for i in range(designs.E_MPa.shape[1]):
-        columns[f"E{i + 1}_MPa"] = designs.E_MPa[:, i]
-    columns["side_mm"] = designs.side_mm
-    columns["remanence_mT"] = designs.remanence_mT
-    if designs.flux_mT is not None:
-        columns["angle_deg"] = designs.angle_deg
-        columns["flux_mT"] = designs.flux_mT
-    elif designs.gap_mm is not None:
-        columns["gap_mm"] = designs.gap_mm
     return columns
 
 

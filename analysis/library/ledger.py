@@ -18,7 +18,7 @@ from ...core.derived import file_digest
 from ...core.door import read_file
 from ...core.errors import StoreError
 from ...core.json import parse_json
-from .space import Space
+from .space import Space, input_columns
 
 LEDGER = "_digests.jsonl"
 SPACE_KEY = b"magbend_space"
@@ -65,8 +65,6 @@ def is_sound(space: Space, digest: str, path: Path, rows: range) -> bool:
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
-
-    from .build import input_columns
 
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:

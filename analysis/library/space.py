@@ -21,7 +21,7 @@ from pydantic import BeforeValidator, ConfigDict, Field, PlainSerializer, WithJs
 from ...core.errors import ConfigError
 from ...core.specimen_file import MagnetModel
 from ...core.toml import FileModel, read_toml
-from ...sim.batch.shapes import Designs
+from ...sim import Designs
 from ..shapes.feasible import falling_moduli, fitting_lengths
 
 Array = NDArray[np.float64]
@@ -381,3 +381,20 @@ def _check_falling(space: Space) -> None:
         )
     if space.method == "grid" and len(space.modulus_rows) == 0:
         raise ValueError("the space is empty: no combination of E_MPa falls")
+
+
+def input_columns(designs: Designs) -> dict[str, NDArray]:
+    """Return the columns of a library that say what was solved."""
+    columns: dict[str, NDArray] = {}
+    for i in range(designs.length_mm.shape[1]):
+        columns[f"length{i + 1}_mm"] = designs.length_mm[:, i]
+    for i in range(designs.E_MPa.shape[1]):
+        columns[f"E{i + 1}_MPa"] = designs.E_MPa[:, i]
+    columns["side_mm"] = designs.side_mm
+    columns["remanence_mT"] = designs.remanence_mT
+    if designs.flux_mT is not None:
+        columns["angle_deg"] = designs.angle_deg
+        columns["flux_mT"] = designs.flux_mT
+    elif designs.gap_mm is not None:
+        columns["gap_mm"] = designs.gap_mm
+    return columns

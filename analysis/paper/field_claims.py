@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 
 from ... import sim
 from ...core.magnet import Magnet
-from ...sim.magnet.fit import axis_flux_by_integral_mT
+from ...sim import axis_flux_by_integral_mT
 from .finding import CUBE, READINGS, Finding, tip_y_mm
 
 READING_SD_MT = 0.5

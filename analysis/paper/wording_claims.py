@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from ... import sim
-from ...sim.magnet.fit import axis_flux_by_integral_mT
+from ...sim import axis_flux_by_integral_mT
 from .finding import CUBE, Finding
 
 EARLIER_RANGE_MPA = (8.0, 50.0)

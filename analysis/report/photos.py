@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import MagbendError
-from ...vision import Calibration, oriented, read_photo, specimen_to_px
-from ...vision.picture.srgb import encode_srgb
+from ...vision import Calibration, encode_srgb, oriented, read_photo, specimen_to_px
 from ..compare.compare import Comparison, RunComparison
 
 Array = NDArray[np.float64]

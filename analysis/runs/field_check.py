@@ -14,7 +14,7 @@ from ...core.checks import finite, positive
 from ...core.errors import InputError
 from ...core.magnet import Magnet
 from ...core.units import mT_from_T
-from ...sim.magnet.fit import axis_share
+from ...sim import axis_share
 
 Sides = tuple[float, float, float]
 

@@ -12,7 +12,7 @@ import numpy as np
 from ...core.files import write_bytes
 from ...core.magnet import Magnet
 from ...core.units import mT_from_T
-from ...sim.magnet.fit import MagnetFit, axis_share, fit_magnet
+from ...sim import MagnetFit, axis_share, fit_magnet
 from .field_check import FieldVerdict, check_against_magnet
 
 

@@ -24,8 +24,7 @@ from ...core.magnet import Magnet
 from ...core.notebook import Tabular, axes_or_new, plot_line
 from ...core.specimen import Specimen
 from ...core.specimen_file import MagnetModel, SpecimenModel
-from ...rig import Run, check_used, read_run
-from ...rig.bench.config import BenchModel
+from ...rig import BenchModel, Run, check_used, read_run
 from ...sim import Support
 from ...vision import (
     Calibration,

@@ -13,8 +13,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ...core.magnet import Magnet
-from ...rig import Plan
-from ...rig.runs.witness import FieldDoubt, Reading
+from ...rig import FieldDoubt, Plan, Reading
 from .field_check import FieldVerdict, check_against_magnet
 
 STRONGEST_T = 1.5

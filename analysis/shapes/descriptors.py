@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ...core.errors import InputError
 from ...core.jit import njit
 from ...core.plugins import load_plugin
-from ...sim.batch import ROWS_PER_CALL, in_threads
+from ...sim import ROWS_PER_CALL, in_threads
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...sim.batch.shapes import Designs, solve_shapes
+from ...sim import Designs, solve_shapes
 from ..expansion import model as expansion
 from ..shapes import descriptors
 from .fit import deviations, draw

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import within
 from ...core.progress import Progress, silent
-from ...sim.batch.shapes import Designs, solve_shapes
+from ...sim import Designs, solve_shapes
 from ..library.space import sobol_points
 from .model import (
     COVERAGE,

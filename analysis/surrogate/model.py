@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...core.units import MU0
-from ...sim.batch.shapes import Designs
+from ...sim import Designs
 from ..expansion.model_file import DAMAGE, damaged, read_model, write_model
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import positive, within
 from ...core.progress import Progress, silent
-from ...sim.batch.shapes import Designs, solve_shapes
+from ...sim import Designs, solve_shapes
 from ..shapes import descriptors
 
 Array = NDArray[np.float64]

@@ -30,7 +30,7 @@ from ...core.errors import ConfigError, InputError, StoreError
 from ...core.files import write_text
 from ...core.specimen import Specimen
 from ...core.units import unit_factor
-from ...sim.batch.shapes import Designs, solve_shapes
+from ...sim import Designs, solve_shapes
 from ..imports.door import read_raw_shapes
 from ..imports.judge import Reading, judged
 from ..imports.shapes import RawShape

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from ...core.magnet import Magnet, Vector
 from ...core.specimen import Specimen
 from ...sim import MagnetField, Solution, Support, magnet_flux_mT, solve
-from ...vision.camera.board import Board
-from ...vision.measurement import Pose
+from ...vision import Board, Pose
 from ...vision.synthetic import (
     Block,
     Scene,

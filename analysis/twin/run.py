@@ -18,13 +18,19 @@ from ...core.files import write_bytes, write_text
 from ...core.owned import owning_folder
 from ...core.specimen import Specimen
 from ...core.specimen_file import specimen_dict
-from ...rig.bench.config import Plan, read_plan
-from ...rig.bench.devices import Devices, closing_all
-from ...rig.bench.template import write_templates
-from ...rig.clock import Clock, SteppedClock
-from ...rig.runs.runner import RunSummary, run
-from ...rig.virtual.bench import open_twin
-from ...rig.wire_log import WireLog
+from ...rig import (
+    Clock,
+    Devices,
+    Plan,
+    RunSummary,
+    SteppedClock,
+    WireLog,
+    closing_all,
+    read_plan,
+    run,
+    write_templates,
+)
+from ...rig.virtual import open_twin
 from ...vision import (
     Calibration,
     Setting,

@@ -11,7 +11,7 @@ from ...core.errors import MagbendError, StageError
 from ..workspace import Workspace, require
 
 if TYPE_CHECKING:
-    from ...analysis.twin.bench import TwinBench
+    from ...analysis import TwinBench
     from ...rig import GapStage
 
 FRAME_S = 0.04
@@ -142,7 +142,7 @@ def open_parts(workspace: Workspace, twin: Twin, *, stop: Callable[[], None]) ->
 
 
 def _open_twin(workspace: Workspace, twin: Twin, held: contextlib.ExitStack) -> Parts:
-    from ...analysis.twin.run import open_twin_bench
+    from ...analysis import open_twin_bench
     from ...rig import ScaledClock
 
     files = workspace.files()

@@ -158,7 +158,7 @@ def misfit_mm(
     measured: Centreline, simulated: Centreline
 ) -> tuple[float | None, float | None]:
     """Return RMS and tip distance of two shapes at the same material points, in mm."""
-    from ...analysis.compare.metrics import position_at
+    from ...analysis import position_at
 
     if measured.s_mm[0] > simulated.s_mm[-1]:
         return None, None

@@ -9,7 +9,7 @@ from ...core.owned import owning_folder
 from ...core.progress import Progress, silent
 from ..bench.config import Plan
 from ..bench.devices import Devices
-from ..interrupts import interrupts
+from ..interrupts import heed_interrupts
 from .control import Report, RunControl, quiet
 from .folder import RunFolder
 from .manifest import make_manifest, require_same
@@ -96,13 +96,13 @@ def run(
     Notes
     -----
     While it runs, in the main thread, the first Ctrl-C (or SIGTERM, or SIGHUP) asks
-    the run to stop, and the second one stops the stage at once (see `interrupts`).
+    the run to stop, and the second one stops the stage at once (see `heed_interrupts`).
     """
     for gap_mm in plan.gaps_mm:
         devices.stage.check_gap(gap_mm)
     with (
         owning_folder(out, "run", "rig run", ours=is_run),
-        interrupts(devices.stage.request_stop) as received,
+        heed_interrupts(devices.stage.request_stop) as received,
     ):
         manifest = make_manifest(plan, devices, twin=twin)
         is_resumed = resume and is_run(out)

@@ -14,7 +14,7 @@ from ...core.progress import Progress, silent
 from ..bench.devices import Devices
 from ..clock import Check, wait
 from ..errors import StoppedError
-from ..interrupts import interrupts
+from ..interrupts import heed_interrupts
 from ..meter.protocol import Flux
 from ..stage.gap import GapStage
 from ..wire_log import WireLog
@@ -125,7 +125,7 @@ def scan_field(
 @contextlib.contextmanager
 def _standing_at_the_end(stage: GapStage, path: Path) -> Iterator[Check]:
     """Yield what every wait calls; whatever ends the scan, the stage stands."""
-    with interrupts(stage.request_stop) as received:
+    with heed_interrupts(stage.request_stop) as received:
 
         def check() -> None:
             if stage.stop_requested():

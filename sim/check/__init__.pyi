@@ -1,9 +1,3 @@
-from .energy import (
-    energy as energy,
-)
-from .energy import (
-    hessian as hessian,
-)
 from .solver import (
     CheckSolution as CheckSolution,
 )

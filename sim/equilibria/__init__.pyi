@@ -1,7 +1,4 @@
 from .find import (
-    Equilibrium as Equilibrium,
-)
-from .find import (
     find_equilibria as find_equilibria,
 )
 from .folds import (
@@ -15,4 +12,7 @@ from .folds import (
 )
 from .folds import (
     trace_branches as trace_branches,
+)
+from .uniform import (
+    Equilibrium as Equilibrium,
 )

@@ -31,8 +31,8 @@ from ..planar.near import settle
 from ..planar.solver import ORDER, STEP
 from ..probe import field_table
 from ..scaling import field_array, rod_array, stations, stiffness_Nmm2
-from .find import Equilibrium, planar_rod, tip_angle_rad, tip_angles
-from .find import equilibrium as uniform_equilibrium
+from .uniform import Equilibrium, planar_rod, tip_angle_rad, tip_angles
+from .uniform import equilibrium as uniform_equilibrium
 
 Array = NDArray[np.float64]
 

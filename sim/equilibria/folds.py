@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ...core.errors import SolverError
 from ...core.specimen import Specimen
 from ..fields import Support, UniformField
-from .find import PlanarRod, planar_rod, scan_rod, tip_angle_rad, tip_angles
+from .uniform import PlanarRod, planar_rod, scan_rod, tip_angle_rad, tip_angles
 
 Array = NDArray[np.float64]
 

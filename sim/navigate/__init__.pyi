@@ -1,6 +1,9 @@
 from .channels import channel as channel
 from .curves import Arc as Arc
 from .curves import circle as circle
+from .curves import (
+    outline as outline,
+)
 from .curves import polyline as polyline
 from .curves import spline as spline
 from .figures import draw_passage as draw_passage

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..equilibria.find import Equilibrium
 from ..equilibria.folds import Branch
+from ..equilibria.uniform import Equilibrium
 from .figures import save
 
 

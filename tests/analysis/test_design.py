@@ -21,7 +21,7 @@ from magbend.analysis.design.makeable import (
     scattered,
 )
 from magbend.analysis.design.path import read_path
-from magbend.analysis.design.search import design, design_all
+from magbend.analysis.design.search import design_all, find_designs
 from magbend.cli.main import app
 from magbend.core.errors import ConfigError, InputError, SolverError
 from magbend.core.magnet import Magnet
@@ -57,7 +57,7 @@ def test_random_reachable_radii_are_hit_by_several_designs():
         field = UniformField(flux_mT=float(rng.uniform(10.0, 120.0)))
         shape = solve_shapes(designs_in(made, field)).points
         wanted = float(goals.achieved(goals.radius_goal(1.0), shape)[0])
-        found = design(goals.radius_goal(wanted), field, FREE, count=5)
+        found = find_designs(goals.radius_goal(wanted), field, FREE, count=5)
         assert len(found) >= 3
         for one in found:
             assert radius_of(one.specimen, field) == pytest.approx(wanted, rel=5e-3)
@@ -66,7 +66,7 @@ def test_random_reachable_radii_are_hit_by_several_designs():
 
 
 def test_designs_are_distinct_and_ranked():
-    found = design(goals.radius_goal(100.0), FIELD, FREE, count=5)
+    found = find_designs(goals.radius_goal(100.0), FIELD, FREE, count=5)
     assert len(found) == 5
     for i, one in enumerate(found):
         for other in found[:i]:
@@ -86,7 +86,7 @@ def test_designs_are_distinct_and_ranked():
 
 
 def test_the_tolerance_is_that_of_made_rods():
-    one = design(goals.radius_goal(100.0), FIELD, FREE, count=1)[0]
+    one = find_designs(goals.radius_goal(100.0), FIELD, FREE, count=1)[0]
     rng = np.random.default_rng(11)
     made = scattered(one.specimen, FREE.scatter, 2000, rng)
     shapes = solve_shapes(designs_in(made, FIELD)).points
@@ -101,13 +101,13 @@ def test_the_tolerance_is_that_of_made_rods():
             )
         }
     )
-    perfect = design(goals.radius_goal(100.0), FIELD, exact, count=1)[0]
+    perfect = find_designs(goals.radius_goal(100.0), FIELD, exact, count=1)[0]
     assert perfect.tolerance < 1e-6
 
 
 def test_what_cannot_be_reached_says_how_near_and_why():
     with pytest.raises(SolverError) as error:
-        design(goals.radius_goal(10.0), UniformField(flux_mT=20.0), FREE)
+        find_designs(goals.radius_goal(10.0), UniformField(flux_mT=20.0), FREE)
     sentence = str(error.value)
     assert "the nearest is 82.6 mm" in sentence.replace("82.59", "82.6")
     assert "side_mm at its lower limit 0.75 mm" in sentence
@@ -117,7 +117,7 @@ def test_what_cannot_be_reached_says_how_near_and_why():
 
 def test_recipes_and_moulds_of_the_paper():
     limits = Makeable(recipe=list(PAPER_RECIPES), sides_mm=list(PAPER_SIDES_MM))
-    found = design(goals.angle_goal(20.0), FIELD, limits, count=3)
+    found = find_designs(goals.angle_goal(20.0), FIELD, limits, count=3)
     known = [recipe.E_MPa for recipe in PAPER_RECIPES]
     for one in found:
         assert [section.E_MPa for section in one.specimen.sections] in known
@@ -129,7 +129,7 @@ def test_recipes_and_moulds_of_the_paper():
 def test_a_tip_before_the_magnet():
     field = MagnetField(magnet=Magnet.cube(55.0, 1.305), gap_mm=55.0)
     wanted = solve(gmc(2), field).centreline.tip_mm
-    for one in design(goals.tip_goal(*wanted), field, FREE, count=2):
+    for one in find_designs(goals.tip_goal(*wanted), field, FREE, count=2):
         tip = solve(one.specimen, field).centreline.tip_mm
         assert np.hypot(*np.subtract(tip, wanted)) < goals.HIT_MM
 
@@ -140,7 +140,7 @@ def test_a_curve_drawn_in_another_frame():
     drawn = line.points_mm @ turn.T + [12.0, -5.0]
     goal = goals.curve_goal(drawn, align=True)
     assert goals.curve_length_mm(goal) == pytest.approx(30.0, rel=1e-3)
-    found = design(goal, FIELD, FREE, count=2)
+    found = find_designs(goal, FIELD, FREE, count=2)
     away = solve(found[0].specimen, FIELD).centreline.points_mm - line.points_mm
     assert np.hypot(*away.T).max() < 0.2
     with pytest.raises(InputError, match="begin at the clamp"):
@@ -224,7 +224,7 @@ def test_wrong_usage_is_one_sentence(tmp_path):
 
 def test_the_first_of_several_is_not_flattered():
     """Its tolerance is that of 20 000 rods nobody has seen."""
-    found = design(goals.radius_goal(100.0), FIELD, FREE, count=5)
+    found = find_designs(goals.radius_goal(100.0), FIELD, FREE, count=5)
     many = scattered(
         found[0].specimen, FREE.scatter, 20_000, np.random.default_rng(987)
     )

@@ -18,7 +18,7 @@ from magbend.sim import UniformField, gmc, solve
 def results(tmp_path_factory):
     mpl.use("Agg")
     run = load_run(write_run(tmp_path_factory.mktemp("runs") / "gmc2", sigma_mm=0.01))
-    (design, *_) = search.design(
+    (design, *_) = search.find_designs(
         goals.angle_goal(12.0), UniformField(flux_mT=50.0), Makeable(), count=1
     )
     return {

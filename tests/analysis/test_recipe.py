@@ -25,7 +25,7 @@ from magbend.analysis import (
 from magbend.analysis.design.goals import radius_goal
 from magbend.analysis.design.makeable import Makeable
 from magbend.analysis.design.mixtures import mixed_recipes
-from magbend.analysis.design.search import design
+from magbend.analysis.design.search import find_designs
 from magbend.analysis.runs.load import RunData
 from magbend.analysis.twin.bench import TwinBench
 from magbend.analysis.twin.deviations import deviating, drawn
@@ -134,7 +134,9 @@ def test_what_is_designed_can_be_mixed(law: Law) -> None:
     offered = mixed_recipes(law, 3)
     assert len(offered) > 50
     limits = Makeable(recipe=offered)
-    found = design(radius_goal(120.0), sim.UniformField(flux_mT=60.0), limits, count=2)
+    found = find_designs(
+        radius_goal(120.0), sim.UniformField(flux_mT=60.0), limits, count=2
+    )
     for one in found:
         mixed = mixtures(one.specimen)
         E_MPa = [section.E_MPa for section in one.specimen.sections]

@@ -15,7 +15,7 @@ import pytest
 from magbend.cli import main as cli
 from magbend.vision import read_calibration, write_calibration
 from magbend.vision.batch.tables import read_centrelines, read_frames, to_centreline
-from magbend.vision.synthetic.score import signed_distance
+from magbend.vision.synthetic.scoring import signed_distance
 
 FIXTURES = Path(__file__).parents[2] / "fixtures" / "vision"
 RENDERED = FIXTURES / "rendered"

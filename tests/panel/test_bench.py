@@ -15,7 +15,7 @@ from magbend.core.errors import InputError, RigError
 from magbend.panel.bench.owner import BenchOwner
 from magbend.panel.bench.sight import Picture, pack, statistics
 from magbend.panel.bench.theory import Place, misfit_mm, model_flux_mT, predict
-from magbend.panel.serve import Address, listen
+from magbend.panel.server import Address, listen
 from magbend.panel.workspace import Workspace
 
 from .panel_server import Served

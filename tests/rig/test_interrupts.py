@@ -8,7 +8,7 @@ import threading
 import pytest
 
 from magbend.rig import interrupts as module
-from magbend.rig.interrupts import StopAtOnce, interrupts
+from magbend.rig.interrupts import StopAtOnce, heed_interrupts
 
 
 class Presses:
@@ -34,14 +34,14 @@ def presses(monkeypatch: pytest.MonkeyPatch) -> Presses:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_the_first_signal_only_asks(presses: Presses, number: int) -> None:
-    with interrupts(presses.ask) as received, received.striking():
+    with heed_interrupts(presses.ask) as received, received.striking():
         presses.press(after_s=1.0, number=number)
         assert presses.asked == 1
     assert received.name == ("Ctrl-C" if number == signal.SIGINT else "SIGTERM")
 
 
 def test_a_second_one_strikes_once_and_only_where_it_may(presses: Presses) -> None:
-    with interrupts(presses.ask) as received:
+    with heed_interrupts(presses.ask) as received:
         presses.press(after_s=1.0)
         presses.press(after_s=1.0)
         struck = 0
@@ -55,7 +55,7 @@ def test_a_second_one_strikes_once_and_only_where_it_may(presses: Presses) -> No
 
 
 def test_one_press_that_is_delivered_twice_is_one(presses: Presses) -> None:
-    with interrupts(presses.ask) as received, received.striking():
+    with heed_interrupts(presses.ask) as received, received.striking():
         presses.press(after_s=1.0)
         presses.press(after_s=0.01, number=signal.SIGTERM)
         presses.press(after_s=0.2)
@@ -65,7 +65,7 @@ def test_one_press_that_is_delivered_twice_is_one(presses: Presses) -> None:
 def test_the_handlers_are_as_they_were_afterwards(presses: Presses) -> None:
     numbers = [signal.SIGINT, signal.SIGTERM]
     before = [signal.getsignal(number) for number in numbers]
-    with interrupts(presses.ask):
+    with heed_interrupts(presses.ask):
         assert [signal.getsignal(number) for number in numbers] != before
     assert [signal.getsignal(number) for number in numbers] == before
 
@@ -73,7 +73,7 @@ def test_the_handlers_are_as_they_were_afterwards(presses: Presses) -> None:
 def test_an_ignored_signal_stays_ignored(presses: Presses) -> None:
     before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
     try:
-        with interrupts(presses.ask):
+        with heed_interrupts(presses.ask):
             presses.press(after_s=1.0, number=signal.SIGTERM)
     finally:
         signal.signal(signal.SIGTERM, before)
@@ -85,7 +85,7 @@ def test_another_thread_leaves_the_signals_alone(presses: Presses) -> None:
     seen = []
 
     def work() -> None:
-        with interrupts(presses.ask):
+        with heed_interrupts(presses.ask):
             seen.append(signal.getsignal(signal.SIGINT))
 
     thread = threading.Thread(target=work)

@@ -20,8 +20,8 @@ from magbend.vision.batch.tables import read_centrelines, read_frames, to_centre
 from magbend.vision.camera.calibration import scale_calibration
 from magbend.vision.measurement import DEVIATION_COLUMNS, POINT_COLUMNS, failure
 from magbend.vision.picture.photo import Photo, read_photo
-from magbend.vision.synthetic.frames import CLEAN, curve, draw
-from magbend.vision.synthetic.score import signed_distance
+from magbend.vision.synthetic.scoring import signed_distance
+from magbend.vision.synthetic.square_view import CLEAN, curve, draw
 
 SIZE = (900, 640)
 SCALE = 16.0

@@ -12,7 +12,7 @@ from magbend.vision.synthetic import (
     render_scene,
     scene_camera,
 )
-from magbend.vision.synthetic.frames import HARD, curve, draw
+from magbend.vision.synthetic.square_view import HARD, curve, draw
 
 HEIGHT_MM, TOP_MM = 0.9, 4.0
 

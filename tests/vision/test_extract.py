@@ -22,8 +22,8 @@ from magbend.vision.synthetic import (
     render_scene,
     scene_camera,
 )
-from magbend.vision.synthetic.frames import HARD, STANDARD, curve, draw
-from magbend.vision.synthetic.score import signed_distance
+from magbend.vision.synthetic.scoring import signed_distance
+from magbend.vision.synthetic.square_view import HARD, STANDARD, curve, draw
 
 FIXTURES = Path(__file__).parents[2] / "fixtures" / "vision"
 SIZE = (1200, 1000)

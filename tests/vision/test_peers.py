@@ -8,8 +8,8 @@ from skimage.measure import label
 from skimage.morphology import skeletonize
 
 from magbend.vision import as_photo, extract, score
-from magbend.vision.synthetic.frames import STANDARD, curve, draw
-from magbend.vision.synthetic.score import signed_distance
+from magbend.vision.synthetic.scoring import signed_distance
+from magbend.vision.synthetic.square_view import STANDARD, curve, draw
 
 
 @pytest.mark.parametrize(("kind", "angle"), [("arc", 90.0), ("graded", -60.0)])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from magbend.vision import Board, Calibration, calibrate, extract, read_photo
-from magbend.vision.synthetic.score import signed_distance
+from magbend.vision.synthetic.scoring import signed_distance
 
 FOLDER = Path(__file__).parents[2] / "fixtures" / "vision" / "photoreal"
 

@@ -18,7 +18,7 @@ from magbend.vision.find.ground import View
 from magbend.vision.find.rod import find_candidates
 from magbend.vision.find.track import start_curve
 from magbend.vision.measurement import Measurement
-from magbend.vision.synthetic.frames import curve, draw
+from magbend.vision.synthetic.square_view import curve, draw
 
 
 def measured(seed=0):

@@ -12,7 +12,7 @@ from magbend.vision import Setting
 from magbend.vision.batch.run import extract_files
 from magbend.vision.batch.tables import read_centrelines, read_frames
 from magbend.vision.camera.calibration import scale_calibration
-from magbend.vision.synthetic.frames import CLEAN, curve, draw
+from magbend.vision.synthetic.square_view import CLEAN, curve, draw
 
 SIZE, SCALE, HEADING = (900, 640), 16.0, 5.0
 SETTINGS = Setting(

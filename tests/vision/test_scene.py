@@ -21,7 +21,7 @@ from magbend.vision.synthetic import (
     render_scene,
     scene_camera,
 )
-from magbend.vision.synthetic.frames import curve
+from magbend.vision.synthetic.square_view import curve
 
 CLAMP = Block(pose=Pose(x_mm=15.0, y_mm=-24.0, angle_deg=3.0, height_mm=0.9))
 QUIET = SceneLight(noise=0.0, blur_px=0.3)

@@ -14,8 +14,15 @@ from magbend.vision.extraction.extract import extract
 from magbend.vision.measurement import Measurement, failure
 from magbend.vision.picture.photo import as_photo
 from magbend.vision.picture.raster import coverage, coverage_of
-from magbend.vision.synthetic.frames import LIGHTS, SHAPES, Light, curve, draw, frames
-from magbend.vision.synthetic.score import score, signed_distance
+from magbend.vision.synthetic.scoring import score, signed_distance
+from magbend.vision.synthetic.square_view import (
+    LIGHTS,
+    SHAPES,
+    Light,
+    curve,
+    draw,
+    frames,
+)
 
 PLAIN = Light(gradient=0.0, blur_px=0.0, noise=0.0)
 

@@ -23,8 +23,8 @@ from magbend.vision.synthetic import (
     render_scene,
     scene_camera,
 )
-from magbend.vision.synthetic.frames import CLEAN, curve, draw
-from magbend.vision.synthetic.score import signed_distance
+from magbend.vision.synthetic.scoring import signed_distance
+from magbend.vision.synthetic.square_view import CLEAN, curve, draw
 
 S = np.arange(-16.0, 16.0, 0.5)
 ACROSS = np.linspace(-6.0, 6.0, 13)

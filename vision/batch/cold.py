@@ -29,9 +29,9 @@ from ..find.rod import _half_widths
 from ..find.track import _resample
 from ..measurement import Pose
 from ..picture.photo import as_photo
-from ..synthetic.frames import curve
 from ..synthetic.parts import Block, Scene, scene_camera
 from ..synthetic.scene import render_scene
+from ..synthetic.square_view import curve
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")

@@ -1,36 +1,3 @@
-from .frames import (
-    CLEAN as CLEAN,
-)
-from .frames import (
-    HARD as HARD,
-)
-from .frames import (
-    LIGHTS as LIGHTS,
-)
-from .frames import (
-    SHAPES as SHAPES,
-)
-from .frames import (
-    STANDARD as STANDARD,
-)
-from .frames import (
-    Frame as Frame,
-)
-from .frames import (
-    Light as Light,
-)
-from .frames import (
-    Truth as Truth,
-)
-from .frames import (
-    curve as curve,
-)
-from .frames import (
-    draw as draw,
-)
-from .frames import (
-    frames as frames,
-)
 from .parts import (
     BLACK as BLACK,
 )
@@ -76,15 +43,48 @@ from .scene import (
 from .scene import (
     render_scene as render_scene,
 )
-from .score import (
+from .scoring import (
     Score as Score,
 )
-from .score import (
+from .scoring import (
     arc_length as arc_length,
 )
-from .score import (
+from .scoring import (
     score as score,
 )
-from .score import (
+from .scoring import (
     signed_distance as signed_distance,
+)
+from .square_view import (
+    CLEAN as CLEAN,
+)
+from .square_view import (
+    HARD as HARD,
+)
+from .square_view import (
+    LIGHTS as LIGHTS,
+)
+from .square_view import (
+    SHAPES as SHAPES,
+)
+from .square_view import (
+    STANDARD as STANDARD,
+)
+from .square_view import (
+    Frame as Frame,
+)
+from .square_view import (
+    Light as Light,
+)
+from .square_view import (
+    Truth as Truth,
+)
+from .square_view import (
+    curve as curve,
+)
+from .square_view import (
+    draw as draw,
+)
+from .square_view import (
+    frames as frames,
 )

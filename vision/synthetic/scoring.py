@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..measurement import Measurement
-from .frames import Truth
+from .square_view import Truth
 
 Array = NDArray[np.float64]
 
