@@ -71,8 +71,9 @@ def equilibria(
         output_file(figure)
     found = once(lambda: find_equilibria(rod, field, support=support))
     branches: tuple[Branch, ...] = ()
-    if fold or figure is not None:
-        branches = once(lambda: trace_branches(rod, field, support=support))
+    uniform = field.uniform
+    if uniform is not None and (fold or figure is not None):
+        branches = once(lambda: trace_branches(rod, uniform, support=support))
     if figure is not None:
         from ..sim import draw_equilibria
 

@@ -92,9 +92,8 @@ def path(
             output_file(file)
     waypoints = [_number(f"--{quantity}", part) or 0.0 for part in text.split(":")]
     support = Support(gravity_m_s2=gravity_m_s2)
-    found = follow_path(
-        rod, field, support=support, steps=steps, **{quantity: waypoints}
-    )  # fmt: skip
+    legs_of: dict[str, Any] = {quantity: waypoints}
+    found = follow_path(rod, field, support=support, steps=steps, **legs_of)
     _write(found, rod.name, out, figure, animation)
     if as_json:
         print_json(_data(rod.name, found))

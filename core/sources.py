@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 from .checks import finite, shown, size, store, vector, whole, within
 from .errors import InputError
@@ -303,7 +303,7 @@ class Gradient:
     centre_mm: Vector = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        given = self.gradient_mT_per_mm
+        given: Any = self.gradient_mT_per_mm
         rows = given.tolist() if hasattr(given, "tolist") else given
         if not isinstance(rows, (list, tuple)) or len(rows) != 3:
             raise InputError(

@@ -253,7 +253,8 @@ class Specimen:
     @property
     def is_plain(self) -> bool:
         """Whether it is straight and magnetised along its axis."""
-        for part in (self, *self.sections):
+        parts: tuple[Specimen | Section, ...] = (self, *self.sections)
+        for part in parts:
             if (
                 part.natural_curvature_per_mm
                 or part.remanence_y_mT

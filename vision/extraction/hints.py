@@ -243,7 +243,10 @@ def _cheapest(cost: Array, start: Array, end: Array) -> Array:
         int(number[round(min(p[1], height - 1)), round(min(p[0], width - 1))])
         for p in (start, end)
     )
-    before = dijkstra(graph, directed=False, indices=first, return_predecessors=True)[1]
+    found: Any = dijkstra(  # type: ignore[call-overload]
+        graph, directed=False, indices=first, return_predecessors=True
+    )
+    before = found[1]
     way = [last]
     while way[-1] != first:
         way.append(int(before[way[-1]]))
