@@ -1,0 +1,155 @@
+"""The harness that predicts published experiments: beam theory, and bad tables."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from magbend.core.errors import ConfigError
+from magbend.core.units import MU0
+
+BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
+HEADS = (
+    "experiment,source,shape,length_mm,length_sd_mm,diameter_mm,width_mm,height_mm,"
+    "size_sd_mm,E_MPa,E_sd_MPa,remanence_mT,remanence_sd_mT,flux_mT,flux_sd_mT,"
+    "angle_deg,angle_sd_deg,quantity,value,value_sd"
+)
+
+
+@pytest.fixture(scope="module")
+def bench() -> ModuleType:
+    spec = importlib.util.spec_from_file_location(
+        "bench_published", BENCHMARKS / "bench_published.py"
+    )
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # its dataclass looks itself up
+    spec.loader.exec_module(module)
+    return module
+
+
+def table(folder: Path, *rows: str, heads: str = HEADS) -> Path:
+    path = folder / "made_up.csv"
+    path.write_text("\n".join([heads, *rows]), encoding="utf-8")
+    return path
+
+
+def row(
+    quantity: str,
+    value: float,
+    *,
+    shape: str = "round",
+    E_sd: float = 0.0,
+    **new: float,
+) -> str:
+    """Return a rod 20 mm long and 1 mm thick, 3 MPa, 100 mT, in 0.1 mT."""
+    at = {"flux": 0.1, "angle": 90.0, "angle_sd": 0.0, "value_sd": 0.0} | new
+    size = "1,," if shape == "round" else ",1,4"
+    return (
+        f"made up,nobody,{shape},20,0,{size},0,3,{E_sd},100,0,{at['flux']},0,"
+        f"{at['angle']},{at['angle_sd']},{quantity},{value},{at['value_sd']}"
+    )
+
+
+def slope(shape: str) -> float:
+    """Return M B A L^2 / (2 E I): the tip angle of a rod that hardly bends."""
+    area, inertia = {
+        "round": (np.pi / 4, np.pi / 64),
+        "rectangle": (4.0, 4.0 / 12),
+    }[shape]
+    return 0.1 * 0.1e-3 / MU0 * area * 20.0**2 / (2 * 3e6 * inertia)
+
+
+@pytest.mark.parametrize("shape", ["round", "rectangle"])
+def test_small_bending_is_that_of_beam_theory(
+    bench: ModuleType, tmp_path: Path, shape: str
+) -> None:
+    truth = slope(shape)
+    rows = bench.predict(
+        table(
+            tmp_path,
+            row("tip_angle_deg", 0.0, shape=shape),
+            row("tip_y_mm", 0.0, shape=shape),
+            row("tip_y_per_length", 0.0, shape=shape),
+        ),
+        draws=3,
+    )
+    expected = [np.degrees(truth), truth * 2 / 3 * 20.0, truth * 2 / 3]
+    assert [r.predicted for r in rows] == pytest.approx(expected, rel=1e-3)
+    assert [r.high - r.low for r in rows] == pytest.approx([0, 0, 0], abs=1e-12)
+    assert not any(r.inside for r in rows)
+
+
+def test_the_band_is_as_wide_as_what_is_stated(
+    bench: ModuleType, tmp_path: Path
+) -> None:
+    truth = np.degrees(slope("round"))
+    path = table(
+        tmp_path,
+        row("tip_angle_deg", truth, E_sd=0.15),
+        row("tip_angle_deg", truth * 1.05, value_sd=0.05 * truth),
+        row("tip_angle_deg", truth * 1.3, E_sd=0.15),
+    )
+    stiff, read, far = bench.predict(path, draws=4000)
+    for one in (stiff, read):  # 5 % either way: 1.96 deviations
+        assert (one.high - one.low) / truth == pytest.approx(2 * 1.96 * 0.05, rel=0.08)
+    assert [stiff.inside, read.inside, far.inside] == [True, True, False]
+
+
+def test_a_rod_turned_to_either_side_counts_as_its_mirror_image(
+    bench: ModuleType, tmp_path: Path
+) -> None:
+    path = table(
+        tmp_path,
+        row("tip_angle_deg", 0.0, flux=60.0, angle=180.0, angle_sd=1.0),
+        row("tip_angle_deg", 0.0, flux=60.0, angle=179.0),
+        row("tip_angle_deg", 0.0, flux=60.0, angle=181.0),
+    )
+    either, left, right = bench.predict(path, draws=200)
+    assert left.predicted == pytest.approx(right.predicted, rel=1e-9)
+    assert left.predicted > 90.0
+    assert 0.0 < either.low <= left.predicted <= either.high
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("round", "oval", "line 2: shape must be one of"),
+        ("tip_angle_deg", "tip_x", "line 2: quantity must be one of"),
+        ("made up,nobody,round,20,0", "made up,nobody,round,20,-1", "length_sd_mm"),
+        ("made up,nobody,round,20,0", "made up,nobody,round,20,", "length_sd_mm"),
+    ],
+)
+def test_a_bad_table_is_refused_with_its_place(
+    bench: ModuleType, tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    path = table(tmp_path, row("tip_angle_deg", 1.0).replace(old, new))
+    with pytest.raises(ConfigError, match=said):
+        bench.predict(path, draws=2)
+
+
+def test_a_table_without_deviations_is_refused(
+    bench: ModuleType, tmp_path: Path
+) -> None:
+    path = table(
+        tmp_path,
+        row("tip_angle_deg", 1.0),
+        heads=HEADS.replace("E_sd_MPa", "doubt"),
+    )
+    with pytest.raises(ConfigError, match="E_sd_MPa"):
+        bench.predict(path, draws=2)
+
+
+def test_every_published_row_has_a_band(bench: ModuleType) -> None:
+    for path in sorted((BENCHMARKS / "published").glob("*.csv")):
+        rows = bench.predict(path, draws=60)
+        assert rows
+        assert all(r.low < r.predicted < r.high for r in rows)
+        slender = [r for r in rows if r.experiment == "large bending, L/C = 41"]
+        assert sum(r.inside for r in slender) >= len(slender) - 2
