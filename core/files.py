@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import secrets
 import stat
@@ -65,12 +66,15 @@ def write_bytes(path: Path, data: bytes) -> None:
     Raises
     ------
     InputError
-        If `path` is empty or names no file.
+        If `path` is empty, names no file, or a pipe that nobody reads.
     OSError
         If the folder is missing, read-only or full; it names `path`, and no temporary
         file is left.
     """
     _check_name(path)
+    if path.is_fifo():
+        _write_pipe(path, data)
+        return
     if path.exists() and not path.is_file():
         path.write_bytes(data)
         return
@@ -92,6 +96,21 @@ def write_bytes(path: Path, data: bytes) -> None:
                 error.strerror = f"there is no folder {path.parent}; make it first"
         raise
     sync_folder(target.parent)
+
+
+def _write_pipe(path: Path, data: bytes) -> None:
+    """Write into a pipe that somebody reads; another would be waited for for ever."""
+    try:
+        descriptor = os.open(path, os.O_WRONLY | os.O_NONBLOCK)
+    except OSError as error:
+        if error.errno != errno.ENXIO:
+            raise
+        raise InputError(
+            f"{path}: is a pipe that nobody reads; remove it or give another name"
+        ) from None
+    os.set_blocking(descriptor, True)
+    with os.fdopen(descriptor, "wb") as file:
+        file.write(data)
 
 
 def _behind_links(path: Path) -> Path:

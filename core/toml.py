@@ -22,8 +22,11 @@ from .door import read_file
 from .errors import ConfigError
 from .json import parse_json
 from .slips import slip_of
+from .text import printable
 
 _MOST_MB = 2.0
+_NAMES = ("name", "operator")
+"""What is printed as it stands, also on terminals."""
 
 Location = tuple[int | str, ...]
 Model = TypeVar("Model", bound="FileModel")
@@ -47,6 +50,9 @@ class FileModel(BaseModel):
         number = bool(kinds & {int, float}) and type(value) not in kinds
         if number and isinstance(value, (str, bool)):
             raise ValueError("must be a number, without quotes")
+        shown_as_is = info.field_name in _NAMES and isinstance(value, str)
+        if shown_as_is and printable(value) != value:
+            raise ValueError("must not hold control characters")
         return value
 
     @field_validator("*", mode="after")
@@ -87,7 +93,16 @@ def _parse_toml(text: str) -> dict[str, Any]:
     """Return what a TOML text holds; names of a thousand dots would take all memory."""
     if re.search(r"(?:[\w\"'-]{1,99}\s*\.\s*){60}", text):
         raise ValueError("it is nested too deep")
-    return tomllib.loads(text)
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("it is nested too deep") from None
+    except tomllib.TOMLDecodeError:
+        raise
+    except ValueError as error:
+        if "integer string" in str(error):  # Python's own limit, and its advice
+            raise ValueError("it holds a number of too many digits") from None
+        raise
 
 
 def _short(error: Exception) -> str:

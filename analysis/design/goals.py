@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.centreline import Centreline
-from ...core.checks import finite, positive, within
+from ...core.checks import finite, size, within
 from ...core.errors import InputError
 from ...core.table import read_table
 from ..shapes import descriptors
@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 HIT_PERCENT = 0.5
 HIT_MM = 0.05
 """What counts as a hit: of a radius or angle in percent, of a tip or curve in mm."""
+LEAST_DEG = 0.001
+"""The least tip angle that can be asked for, in deg; a straight rod has less."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,14 +59,17 @@ class Goal:
 
 def radius_goal(radius_mm: float) -> Goal:
     """Return the goal of a bending radius."""
-    return Goal(kind="radius", wanted=(positive(radius_mm, "radius_mm", "mm"),))
+    return Goal(kind="radius", wanted=(size(radius_mm, "radius_mm", "mm"),))
 
 
 def angle_goal(tip_angle_deg: float) -> Goal:
     """Return the goal of a tip angle."""
     angle = within(tip_angle_deg, -180.0, 180.0, "tip_angle_deg", "deg")
-    if angle == 0.0:
-        raise InputError("tip_angle_deg must not be zero: any straight rod has it")
+    if abs(angle) < LEAST_DEG:
+        raise InputError(
+            f"tip_angle_deg must be {LEAST_DEG:g} deg or more, either way; instead "
+            f"received {angle:g}, which any straight rod has"
+        )
     return Goal(kind="angle", wanted=(angle,))
 
 

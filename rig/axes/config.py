@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Annotated, Literal
 
 from pydantic import (
@@ -18,6 +19,8 @@ from ...core.toml import FileModel
 from ..ports import allowed_port
 
 _FINITE = Annotated[float, Field(allow_inf_nan=False)]
+_PLACE = re.compile(r"\{value(:[-+ ]?0?\d{0,2}(\.\d{1,2})?[eEfFgG]?)?\}")
+"""Where `set_line` takes the value, and in which of Python's formats of numbers."""
 
 
 class AxisConfig(FileModel):
@@ -56,13 +59,23 @@ class AxisConfig(FileModel):
             raise ValueError("rest must be from min to max")
         if self.driver == "line" and not self.port:
             raise ValueError("driver line needs a port")
-        if self.driver == "line" and "{value" not in self.set_line:
-            raise ValueError('set_line must hold {value}, such as "CURR {value:.4f}"')
+        rest, places = _PLACE.subn("", self.set_line)
+        odd = places > 1 or "{" in rest or "}" in rest
+        if odd or (self.driver == "line" and not places):
+            raise ValueError(
+                'set_line must hold {value} once, such as "CURR {value:.4f}", and no '
+                "other braces"
+            )
         return self
 
     def text(self, value: float) -> str:
         """Return the line that sets a value."""
         return self.set_line.format(value=value)
+
+    def written(self, value: float) -> float:
+        """Return the number that the device will read, rounded as `set_line` says."""
+        place = _PLACE.search(self.set_line)
+        return float(place.group().format(value=value)) if place else value
 
 
 class ScanConfig(FileModel):
@@ -74,6 +87,12 @@ class ScanConfig(FileModel):
 
 def why_not_set(axis: AxisConfig, value: float) -> str:
     """Return why a value may not be set, in a clause; empty if it may."""
-    if math.isfinite(value) and axis.min <= value <= axis.max:
-        return ""
-    return f"must be from {axis.min:g} to {axis.max:g}; instead received {value:g}"
+    if not (math.isfinite(value) and axis.min <= value <= axis.max):
+        return f"must be from {axis.min:g} to {axis.max:g}; instead received {value:g}"
+    written = axis.written(value)
+    if not axis.min <= written <= axis.max:
+        return (
+            f"must be from {axis.min:g} to {axis.max:g} as set_line writes it; instead "
+            f"it writes {value:g} as {written:g}"
+        )
+    return ""

@@ -10,7 +10,7 @@ import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
@@ -37,7 +37,7 @@ class SettleConfig(FileModel):
     """
 
     by: Literal["image", "time"] = "image"
-    time_s: NonNegativeFloat = 2.0
+    time_s: Annotated[float, Field(ge=0.0, le=86400.0)] = 2.0
     image_change_percent: PositiveFloat = 0.02
     frames: int = Field(default=5, ge=2)
     window_s: NonNegativeFloat = 0.5

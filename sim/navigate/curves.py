@@ -177,16 +177,22 @@ def _off(arcs: tuple[Arc, ...], curve: object, at: Array) -> float:
     return off
 
 
+def pieces_of(arcs: Sequence[Arc]) -> float:
+    """Return about how many points `outline` would take, without making them."""
+    return sum(max(1.0, _pieces(arc, 0.25)) for arc in arcs)
+
+
+def _pieces(arc: Arc, step_mm: float) -> float:
+    if arc.curvature_per_mm:
+        return max(abs(arc.turn_rad) / 0.05, arc.length_mm / 5.0)
+    return arc.length_mm / (20.0 * step_mm)
+
+
 def outline(arcs: Sequence[Arc], step_mm: float = 0.25) -> Array:
     """Return points along a wall for drawing and for tests of crossing, in mm."""
     points: list[Point] = []
     for arc in arcs:
-        pieces = 1
-        if arc.curvature_per_mm:
-            turns = abs(arc.turn_rad) / 0.05
-            pieces = max(1, math.ceil(turns), math.ceil(arc.length_mm / 5.0))
-        else:
-            pieces = max(1, math.ceil(arc.length_mm / (20.0 * step_mm)))
+        pieces = max(1, math.ceil(_pieces(arc, step_mm)))
         points += [arc.at(k / pieces) for k in range(pieces)]
     points.append(arcs[-1].at(1.0))
     return np.array(points)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...core.checks import size, store, within
 from ...core.errors import InputError
-from .curves import Arc, Point, outline
+from .curves import Arc, Point, outline, pieces_of
 from .walls import COLUMNS, Walls, clearances
 
 Array = NDArray[np.float64]
@@ -21,6 +21,8 @@ FEED = "feed"
 PUSH = "push"
 CORNER_RAD = 1e-6
 """Where parts meet at a smaller angle than this, the wall is smooth."""
+MOST_PIECES = 4000
+"""How many pieces the walls of a lumen may have: each is held against each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +96,7 @@ class Lumen:
             gates=tuple(self.gates),
             entry_angle_deg=angle,
         )
+        _check_size(self)
         _check_crossing(self)
 
     @property
@@ -241,6 +244,16 @@ def _row(
     ends = [value / unit_mm for value in (x0, y0, x1, y1)]
     cull = [value / unit_mm for value in (xm, ym, reach)]
     return [kind, *scaled, sense, half, *cull, *ends, *start, *end]
+
+
+def _check_size(lumen: Lumen) -> None:
+    pieces = sum(pieces_of(wall.arcs) for wall in lumen.walls)
+    if not pieces <= MOST_PIECES:
+        raise InputError(
+            f"the walls of lumen {lumen.name!r} must not have more than {MOST_PIECES} "
+            f"pieces, of 5 mm at most; instead they have {pieces:.3g}: take fewer "
+            "points, and check that lengths are in mm"
+        )
 
 
 def _check_crossing(lumen: Lumen) -> None:

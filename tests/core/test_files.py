@@ -178,3 +178,33 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_work(
     monkeypatch.setattr(os, "access", lambda *_: False)
     with pytest.raises(InputError, match="nothing may be written in this folder"):
         output_file(tmp_path / "shape.csv")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_that_nobody_reads_is_refused_and_not_waited_for(tmp_path):
+    pipe = tmp_path / "comparison.csv"
+    os.mkfifo(pipe)
+    with pytest.raises(InputError, match="a pipe that nobody reads"):
+        write_bytes(pipe, b"x")
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    write_bytes(pipe, b"x")
+    assert os.read(reader, 9) == b"x"
+    os.close(reader)
+
+
+@pytest.mark.parametrize(
+    ("text", "match"),
+    [
+        (GOOD.replace("GMC 2", r"GMC \u001b[31m"), "line 1: name: .* control char"),
+        (GOOD.replace("GMC 2", r"GMC \u202e"), "line 1: name: .* control char"),
+        ("side_mm = 1" + 5000 * "0", "number of too many digits$"),
+        ("a = " + 3000 * "[" + 3000 * "]", "nested too deep$"),
+    ],
+)
+def test_what_would_steer_a_terminal_or_the_reader_is_one_sentence(
+    tmp_path, text, match
+):
+    path = tmp_path / "rod.toml"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=match):
+        read_specimen(path)

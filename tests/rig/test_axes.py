@@ -9,7 +9,7 @@ import threading
 import pytest
 
 from magbend.core.errors import ConfigError, RigError
-from magbend.rig.axes.config import AxisConfig
+from magbend.rig.axes.config import AxisConfig, why_not_set
 from magbend.rig.axes.line import LineAxis
 from magbend.rig.bench.config import read_plan
 from magbend.rig.bench.template import write_templates
@@ -148,3 +148,28 @@ def test_a_supply_that_does_not_get_there_is_no_step():
     with pytest.raises(RigError, match=r"must become 1\.2 .* instead it is 0\.7"):
         axis.set(1.2)
     axis.close()
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "CURR {value!z}",
+        "CURR {value:q}",
+        "CURR {value.__class__}",
+        "CURR {value} {other}",
+        "CURR {value:999999999f}",
+        "CURR {value",
+        "CURR {value} {value}",
+    ],
+)
+def test_a_line_that_could_not_be_sent_is_refused_when_the_file_is_read(line):
+    with pytest.raises(ValueError, match=r"set_line must hold \{value\} once"):
+        AxisConfig(name="current_A", port="COM3", min=0.0, max=2.0, set_line=line)
+
+
+def test_rounding_takes_no_value_beyond_the_limits():
+    axis = AxisConfig(
+        name="current_A", port="COM3", min=0.0, max=1.6, set_line="CURR {value:.0f}"
+    )
+    assert why_not_set(axis, 1.4) == ""
+    assert "writes 1.6 as 2" in why_not_set(axis, 1.6)

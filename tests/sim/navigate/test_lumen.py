@@ -234,3 +234,13 @@ def test_steps_without_end_are_refused():
     lumen = channel("tube", width_mm=3.0, legs=[(40.0, 0.0)])
     with pytest.raises(InputError, match=r"step_mm must be from 0\.0015"):
         navigate(gmc(2), lumen, NOTHING, step_mm=1e-6)
+
+
+def test_walls_of_too_many_pieces_are_refused_before_they_are_drawn():
+    with pytest.raises(InputError, match="not have more than 4000 pieces"):
+        channel("long", width_mm=2.5, legs=[(1e9, 0.0)])
+    points = [(0.001 * k, 2.0) for k in range(60_000)]
+    with pytest.raises(InputError, match="not have more than 4000 pieces"):
+        Lumen(
+            name="fine", walls=(Wall("upper", polyline(points)),), inside_mm=(1.0, 0.0)
+        )
