@@ -67,6 +67,7 @@ def points(
             linear=linear,
         ),
         hints,
+        made_with=[calibration] if calibration else [],
     )
     if not found.ok:
         raise VisionError(f"{photo}: {found.reason}")

@@ -10,6 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from magbend.cli.main import app
+from magbend.core.derived import check_derived
 from magbend.core.errors import InputError
 from magbend.vision import (
     Hints,
@@ -139,6 +140,8 @@ def test_a_refused_photograph_is_rescued_into_its_tables(frame, plain, tmp_path)
     assert (tmp_path / "out" / "overlays" / "b.png").is_file()
     rescue(tmp_path / "b.png", tmp_path / "out", setting, hints_of(plain))
     assert len(read_frames(tmp_path / "out" / "frames.csv")) == 2
+    noted = {one.name: one.status for one in check_derived(tmp_path / "out")}
+    assert noted["frames.csv"] == noted["overlays/b.png"] == "good"
 
 
 @pytest.mark.parametrize(
