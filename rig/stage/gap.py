@@ -183,6 +183,8 @@ class GapStage:
         ------
         StageError
             If the stage is not standing, or must be homed first.
+        InterlockError
+            If no gap within the limits could be reached by that map.
         """
         finite(gap_mm, "gap_mm", "mm")
         machine_mm = self._stage.status().machine_mm
@@ -190,10 +192,27 @@ class GapStage:
             raise PositionLostError("the stage does not report a position; home it")
         sign = direction or self._config.direction
         gap_at_zero_mm = round(gap_mm - sign * machine_mm, 3)
-        self._stage.assume_homed(machine_mm, (gap_at_zero_mm, sign), for_run=for_run)
-        self._config = self._config.model_copy(
+        before = self._config
+        self._config = before.model_copy(
             update={"gap_at_zero_mm": gap_at_zero_mm, "direction": sign}
         )
+        low_mm, high_mm = self.range_mm()
+        if low_mm >= high_mm:
+            self._config = before
+            raise InterlockError(
+                f"with a gap of {gap_mm:g} mm here (direction {sign}) no gap would lie "
+                f"both within the travel of the controller and from min_gap_mm = "
+                f"{self._bounds.min_gap_mm:g} to max_gap_mm = "
+                f"{self._bounds.max_gap_mm:g} mm; gauge it again, or correct [limits] "
+                "of the rig file; nothing was changed"
+            )
+        try:
+            self._stage.assume_homed(
+                machine_mm, (gap_at_zero_mm, sign), for_run=for_run
+            )
+        except BaseException:
+            self._config = before
+            raise
         self._assumed = (
             {"gap_mm": gap_mm, "stage_mm": machine_mm} if for_run else self._assumed
         )

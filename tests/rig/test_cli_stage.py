@@ -72,6 +72,15 @@ def test_a_session_from_power_up_to_a_gap(bench_folder):
     assert "already stands" in rig("stop")
 
 
+def test_a_gap_that_leaves_no_gap_is_not_kept(bench_folder):
+    rig("home")
+    before = (bench_folder / "rig.toml").read_bytes()
+    with pytest.raises(MagbendError, match=r"500 mm here.*gauge it again"):
+        rig("set-gap", "500")
+    assert (bench_folder / "rig.toml").read_bytes() == before
+    assert "homed" in rig("status")
+
+
 def test_goto_homes_first_if_told(bench_folder):
     assert "gap 110.000 mm" in rig("goto", "110", "--home")
 
