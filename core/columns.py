@@ -21,6 +21,7 @@ from .units import known_unit, unit_factor
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?", re.ASCII)
 COMMA_NUMBER = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
 THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?", re.ASCII)
+_POINTED = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+,\d+", re.ASCII)
 _PLAIN = re.compile(r"[-+0-9.eE\n]*", re.ASCII)
 _HEAD_UNIT = re.compile(r"(.*?)\s*[(\[]\s*([^()\[\]]*?)\s*[)\]]\s*$")
 _NOTHING = frozenset(("", "nan", "na", "n/a", "none", "null", "-", "--"))
@@ -178,10 +179,12 @@ class Table:
             return "; write it without an underscore"
         if THOUSANDS.fullmatch(text) and "," in text:
             return "; write thousands without a comma, and decimals with a point"
+        if re.match(r"[+-]?[\d.,]+\s*[^\d\s.,eE]", text):
+            return "; write the number alone, and its unit in the head"
+        if _POINTED.fullmatch(text):
+            return "; write thousands without a point, as 1250,5"
         if "," in text:
             return "; write decimals with a point, not a comma"
-        if re.match(r"[+-]?[\d.]+\s*[^\d\s.eE]", text):
-            return "; write the number alone, and its unit in the head"
         return ""
 
 
