@@ -179,24 +179,33 @@ def _plain_types(annotation: Any) -> set[Any]:
 def _sentence(
     path: Path, text: str, error: ValidationError, model: type[BaseModel]
 ) -> str:
+    line = line_of(text, _first(error)["loc"])
+    where = f"{path}, line {line}" if line else f"{path}"
+    return f"{where}: {wrong_key(error, model)}"
+
+
+def _first(error: ValidationError) -> Any:
     # A mistyped key is both unknown and missing: name the one the user can see.
     errors = error.errors()
-    first = next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
+    return next((e for e in errors if e["type"] == "extra_forbidden"), errors[0])
+
+
+def wrong_key(error: ValidationError, model: type[BaseModel]) -> str:
+    """Return what is wrong with a table, in half a sentence: the key, and why."""
+    first = _first(error)
     location = first["loc"]
-    line = line_of(text, location)
-    where = f"{path}, line {line}" if line else f"{path}"
-    key = ".".join(str(part) for part in location) or "the file"
+    key = ".".join(str(part) for part in location)
     if first["type"] == "extra_forbidden":
-        return f"{where}: unknown key {key!r}{_suggestion(location, model)}"
+        return f"unknown key {key!r}{_suggestion(location, model)}"
     if first["type"] == "missing":
-        return f"{where}: the key {key!r} is missing"
+        return f"the key {key!r} is missing"
     if first["type"] == "too_short":
-        return (
-            f"{where}: {key}: must hold at least {first['ctx']['min_length']} of them"
-        )
+        return f"{key}: must hold at least {first['ctx']['min_length']} of them"
     message = first["msg"].removeprefix("Value error, ")
     message = message[0].lower() + message[1:]
-    return f"{where}: {key}: {message}; instead received {shown(first['input'])}"
+    if not location:  # of the keys together: each of them is right by itself
+        return message
+    return f"{key}: {message}; instead received {shown(first['input'])}"
 
 
 def _suggestion(location: Location, model: type[BaseModel]) -> str:

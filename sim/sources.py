@@ -20,7 +20,7 @@ from ..core.magnet import Vector
 from ..core.plugins import load_plugin
 from ..core.sources import Coil, Cuboid, Cylinder, Dipole, Gradient, Source, Uniform
 from ..core.specimen_file import read_magnet
-from ..core.toml import FileModel, read_toml
+from ..core.toml import FileModel, read_toml, wrong_key
 from .fields import Field, cuboid_of
 from .magnet.map import FieldMap, read_map, sampled_map
 
@@ -130,10 +130,10 @@ def read_field(path: Path) -> Field:
 def _source(path: Path, number: int, table: _Other) -> Source:
     keys = table.model_dump()
     where = f"{path}: source {number} ({table.kind})"
+    model, build = _KINDS.get(table.kind, (FileModel, None))
     try:
         if table.kind not in _KINDS:
             return _other(keys)
-        model, build = _KINDS[table.kind]
         given = {
             key: value
             for key, value in model.model_validate(keys).model_dump().items()
@@ -146,11 +146,7 @@ def _source(path: Path, number: int, table: _Other) -> Source:
             given["sides_mm"] = (given.pop("side_mm"),) * 3
         source: Source = build(**given)
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"]) or "its keys"
-        raise ConfigError(
-            f"{where}: {key}: {first['msg'].removeprefix('Value error, ')}"
-        ) from None
+        raise ConfigError(f"{where}: {wrong_key(error, model)}") from None
     except (InputError, TypeError) as error:
         raise ConfigError(f"{where}: {error}") from None
     return source

@@ -44,7 +44,7 @@ class CameraConfig(FileModel):
     def _backend_is_offered(cls, backend: str) -> str:
         if backend not in OWN_BACKENDS and backend not in offered(GROUP):
             known = ", ".join(sorted({*OWN_BACKENDS, *offered(GROUP)}))
-            raise ValueError(f"must be one of {known}; instead received {backend!r}")
+            raise ValueError(f"must be one of {known}")
         return backend
 
     @model_validator(mode="after")

@@ -92,7 +92,7 @@ class StageConfig(FileModel):
     def _driver_is_offered(cls, driver: str) -> str:
         if driver not in OWN_DRIVERS and driver not in offered(GROUP):
             known = ", ".join(sorted({*OWN_DRIVERS, *offered(GROUP)}))
-            raise ValueError(f"must be one of {known}; instead received {driver!r}")
+            raise ValueError(f"must be one of {known}")
         return driver
 
     @model_validator(mode="after")

@@ -410,9 +410,9 @@ def test_files_hold_sources(tmp_path: Path) -> None:
     old = MagnetField(magnet=Magnet.cube(55.0, 1.305), gap_mm=60.0)
     assert read_field(path).at_gap(60.0).sources == old.sources
     for old_text, new, said in (
-        ("side_mm = 55.0", "side = 55.0", "source 0 .cuboid.: side"),
+        ("side_mm = 55.0", "side = 55.0", "source 0 .cuboid.: unknown key .side."),
         ('"cuboid"', '"cubiod"', "kind must be one of.*cuboid.*'cubiod'"),
-        ("flux_mT = 5.0", "", "source 1 .uniform.: flux_mT"),
+        ("flux_mT = 5.0", "", "source 1 .uniform.: the key .flux_mT. is missing"),
         ("remanence_T = 1.305", "remanence_T = 1305.0", "remanence_T: 1305 T .*in mT"),
     ):
         path.write_text(FILE.replace(old_text, new), encoding="utf-8")
