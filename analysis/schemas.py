@@ -43,7 +43,8 @@ def toml_schema(kind: str) -> dict[str, Any]:
         return read_json(Path(__file__).with_name(f"{kind}.schema.json"))
     if kind not in KINDS:
         known = ", ".join([*KINDS, *RECORDS])
-        raise InputError(f"no schema is called {kind!r}; there are {known}")
+        what = f"no schema is called {kind!r}" if kind else "say which schema"
+        raise InputError(f"{what}; there are {known}; --out writes them all")
     module, name = KINDS[kind]
     schema: dict[str, Any] = getattr(import_module(module), name).model_json_schema()
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}

@@ -77,7 +77,9 @@ def examples(
 
 def schema(
     kind: str = typer.Argument(
-        "", help="specimen, magnet, rig, plan, meter, space or makeable."
+        "",
+        help="specimen, magnet, rig, plan, meter, space, calibration or makeable; "
+        "of records run, step, fit or comparison.",
     ),
     out: Path | None = typer.Option(
         None, "--out", help="Write every schema into this folder."

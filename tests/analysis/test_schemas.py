@@ -10,7 +10,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from magbend.analysis.examples import copy_examples
-from magbend.analysis.schemas import KINDS, toml_schema, write_toml_schemas
+from magbend.analysis.schemas import KINDS, RECORDS, toml_schema, write_toml_schemas
 from magbend.core.errors import InputError, StoreError
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
@@ -36,7 +36,7 @@ def test_shipped_files_fit_their_schema(kind: str, path: Path) -> None:
 
 def test_every_schema_is_one(tmp_path: Path) -> None:
     paths = write_toml_schemas(tmp_path / "new")
-    assert len(paths) == len(KINDS)
+    assert len(paths) == len(KINDS) + len(RECORDS)
     for path in paths:
         Draft202012Validator.check_schema(json.loads(path.read_text(encoding="utf-8")))
 
@@ -44,6 +44,8 @@ def test_every_schema_is_one(tmp_path: Path) -> None:
 def test_an_unknown_kind_is_one_sentence() -> None:
     with pytest.raises(InputError, match="there are specimen, magnet"):
         toml_schema("rod")
+    with pytest.raises(InputError, match="say which schema; there are"):
+        toml_schema("")
 
 
 def test_examples_are_copied_once(tmp_path: Path) -> None:
