@@ -139,7 +139,10 @@ def print_proposals(
         typer.echo(
             f"{result.specimen.name}: the worst modulus is known to {max(known):.2g} %"
         )
-    typer.echo("sd, %  minutes  change")
+    if not found:
+        typer.echo("nothing useful is done in that time: give --minutes more")
+    else:
+        typer.echo("sd, %  minutes  change")
     for one in found:
         typer.echo(f"{one.predicted_sd_percent:5.2f}  {one.minutes:7.0f}  {one.change}")
     for sentence in limits:
