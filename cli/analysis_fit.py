@@ -69,7 +69,7 @@ def fit(
     posterior: int = typer.Option(
         0, "--posterior", help="Also sample the posterior: steps per walker (emcee)."
     ),
-    seed: int = typer.Option(0, "--seed", help="Of the posterior's walkers."),
+    seed: int = typer.Option(0, "--seed", min=0, help="Of the posterior's walkers."),
     clamp_angle_deg: float = CLAMP,
     gravity_m_s2: tuple[float, float, float] = GRAVITY,
     load_factor: float = LOAD,

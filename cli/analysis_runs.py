@@ -140,7 +140,7 @@ def report(
 
 def paper(
     out: Path = typer.Option(Path("paper"), "--out", help="Folder for the runs."),
-    seed: int = typer.Option(1, "--seed", help="Of the twin's hidden truth."),
+    seed: int = typer.Option(1, "--seed", min=0, help="Of the twin's hidden truth."),
     workers: int = typer.Option(
         2, "--workers", min=1, help="Benches that run side by side."
     ),

@@ -20,7 +20,7 @@ SCHEMA_EXAMPLE = (
 def demo(
     out: Path = typer.Option(Path("demo"), "--out", help="Folder for the run."),
     seed: int = typer.Option(
-        2, "--seed", help="Which hidden truth the twin bench gets."
+        2, "--seed", min=0, help="Which hidden truth the twin bench gets."
     ),
     panel: bool = typer.Option(
         False, "--panel", help="Play the loop on the control panel instead."

@@ -32,7 +32,9 @@ def panel(
     no_browser: bool = typer.Option(
         False, "--no-browser", help="Print the address; open no browser."
     ),
-    seed: int = typer.Option(1, "--seed", help="Which hidden truth the twin gets."),
+    seed: int = typer.Option(
+        1, "--seed", min=0, help="Which hidden truth the twin gets."
+    ),
     speed: float = typer.Option(
         1.0, "--speed", help="How many times as fast as the wall's the twin's clock is."
     ),

@@ -30,7 +30,7 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 Twin = Annotated[
     bool, typer.Option("--twin", help="Rehearse on the computed bench; no device.")
 ]
-Seed = Annotated[int, typer.Option(help="Which hidden truth the twin gets.")]
+Seed = Annotated[int, typer.Option(min=0, help="Which hidden truth the twin gets.")]
 Manual = Annotated[
     str,
     typer.Option(

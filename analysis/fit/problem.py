@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ... import sim
 from ...core.centreline import Centreline
-from ...core.errors import InputError, StoreError
+from ...core.errors import InputError, SolverError, StoreError
 from ...core.specimen import Specimen
 from ..compare.compare import field_of, frame_problem, usable_flux
 from ..runs.load import RunData, Step
@@ -40,6 +40,9 @@ LENGTH_MM = 0.05
 
 READING_PERCENT = 0.2
 """What a reading scatters by besides its samples: the probe is put back by hand."""
+
+MOST_LOG = 700.0
+"""Logarithm of the greatest factor that a float can hold."""
 
 FREE_NAMES = ("remanence_mT", "load_factor", "magnet_remanence_T")
 """What may be fitted besides the moduli, without a prior."""
@@ -169,6 +172,11 @@ class Problem:
         """Return what unknown `k` is in its own unit."""
         p = len(self.names)
         if k < p:
+            if unknown > MOST_LOG:
+                raise SolverError(
+                    f"the data do not hold {self.names[k]}: the search drove it beyond "
+                    "all numbers; free fewer parameters, or give the moduli bounds"
+                )
             return self.nominal(self.names[k]) * math.exp(unknown)
         return unknown * float(self.nuisance_sd[k - p])
 
@@ -283,6 +291,11 @@ def _check(
         raise InputError(
             f"free parameter must be one of {', '.join(FREE_NAMES)}; "
             f"instead received {unknown[0]!r}"
+        )
+    if support.load_factor == 0.0:
+        raise InputError(
+            "load_factor must be above zero for a fit: without magnetism no modulus "
+            "shows; instead received 0"
         )
     if model not in MODELS:
         raise InputError(

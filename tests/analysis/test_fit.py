@@ -283,3 +283,12 @@ def test_wrong_sign_of_the_remanence_ends_in_a_sentence(tmp_path: Path) -> None:
     run = load_run(write_run(tmp_path / "a", specimen=wrong, truth=sim.gmc(2)))
     with pytest.raises(SolverError, match="sign of its remanence"):
         fit_runs([run])
+
+
+def test_what_runs_away_is_one_sentence_and_no_magnetism_is_refused(tmp_path: Path):
+    run = load_run(write_run(tmp_path / "run"))
+    problem = build_problem([run], free=["remanence_mT"])
+    with pytest.raises(SolverError, match="do not hold E_MPa"):
+        problem.value(0, 1e4)
+    with pytest.raises(InputError, match="load_factor must be above zero for a fit"):
+        build_problem([run], support=sim.Support(load_factor=0.0))

@@ -165,3 +165,19 @@ def test_ctrl_c_at_the_prompt_for_a_reading_stops_the_run(monkeypatch) -> None:
     monkeypatch.setattr(typer, "prompt", press)
     with pytest.raises(StoppedError):
         ask_flux(70.0)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["demo"],
+        ["panel"],
+        ["rig", "run", "p.toml"],
+        ["analysis", "paper"],
+        ["analysis", "fit", "run"],
+    ],
+)
+def test_a_seed_below_zero_is_refused_before_anything_is_done(words):
+    result = CliRunner().invoke(app, [*words, "--seed", "-1"])
+    assert result.exit_code == 2
+    assert "--seed" in result.output

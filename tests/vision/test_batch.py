@@ -172,6 +172,7 @@ def test_every_bad_picture_has_a_row_that_says_why(tmp_path, good):
         assert row.status == "failed"
         assert row.flags
         assert len(row.reason) > 15
+        assert "Errno" not in row.reason
     for name in (
         "empty.png",
         "cut.png",

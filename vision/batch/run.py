@@ -194,8 +194,11 @@ class _Task:
             if self.setting.calibration is not None:
                 photo = oriented(photo, self.setting.calibration)
             measurement = follow(photo, self.setting, last)
-        except (MagbendError, OSError) as error:
+        except MagbendError as error:
             measurement = failure("unreadable", str(error))
+        except OSError as error:
+            reason = error.strerror or str(error)
+            measurement = failure("unreadable", f"cannot be read: {reason}")
         if self.overlays is not None and photo is not None:
             write_bytes(self.overlays / source.overlay, overlay_png(photo, measurement))
         done = done_with(
