@@ -13,7 +13,7 @@ import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from .columns import COMMA_NUMBER, THOUSANDS, Table, parse_number
+from .columns import COMMA_NUMBER, THOUSANDS, Table, parse_number, split_unit
 from .decode import decode_text, read_bytes
 from .errors import ConfigError
 from .units import known_unit
@@ -196,7 +196,10 @@ def _units_below(
     if not named or len(units) > len(names) or not all(map(known_unit, named)):
         return names, cells
     units += [""] * (len(names) - len(units))
-    headed = [f"{n} ({u})" if u else n for n, u in zip(names, units, strict=True)]
+    headed = [
+        f"{n} ({u})" if u and split_unit(n)[1] != u else n
+        for n, u in zip(names, units, strict=True)
+    ]
     return headed, cells[1:]
 
 

@@ -42,6 +42,9 @@ READ = {
     "another unit": b"gap (m),flux (T)\n.0705,.038\n6e-2,0.0505\n5.025E-2,66e-3\n",
     "gauss": b"gap_cm,flux (G)\n7.05,380\n6.0,505\n5.025,660\n",
     "units below": b"gap,flux\nmm,mT\n70.5,38\n60.0,50.5\n50.25,66\n",
+    "units in the heads and below": (
+        b"gap_mm,flux (mT)\nmm,mT\n70.5,38\n60.0,50.5\n50.25,66\n"
+    ),
     "a note": b'gap_mm,note,flux_mT\n70.5,"warm, again",38\n60,,50.5\n50.25,a,66\n',
     "latin": "gap_mm;flux_mT;Länge µ\n70,5;38;é\n60;50,5;ö\n50,25;66;\n".encode(
         "latin-1"
