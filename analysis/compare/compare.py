@@ -305,7 +305,7 @@ def field_of(
     """Return the field of a step, or a sentence that says why there is none."""
     if model == "magnet":
         if magnet is None:
-            return "no magnet: the run's rig file does not describe one"
+            return "no magnet: no rig file and no analysis import --magnet names one"
         if not math.isfinite(step.gap_mm):
             return "no gap: the table of this run does not say it"
         return sim.MagnetField(magnet=magnet, gap_mm=step.gap_mm)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -141,10 +141,10 @@ class RunData(Tabular):
     specimen: Specimen
     magnet: Magnet | None
     steps: tuple[Step, ...]
-    frames: dict[str, Frame]
-    calibration: Calibration | None
-    record: dict[str, Any]
-    end: dict[str, Any]
+    frames: dict[str, Frame] = field(repr=False)
+    calibration: Calibration | None = field(repr=False)
+    record: dict[str, Any] = field(repr=False)
+    end: dict[str, Any] = field(repr=False)
     warnings: tuple[str, ...]
 
     @property
@@ -435,10 +435,11 @@ def _number(value: Any) -> float:
 def _calibration(path: Path, warnings: list[str]) -> Calibration | None:
     file = path / "calibration.json"
     if not file.is_file():
-        warnings.append(
-            "calibration.json is not in the run folder: simulated shapes cannot be "
-            f"drawn on the photographs; copy it to {file}"
-        )
+        if any((path / "images").glob("*")):
+            warnings.append(
+                "calibration.json is not in the run folder: simulated shapes cannot "
+                f"be drawn on the photographs; copy it to {file}"
+            )
         return None
     try:
         return read_calibration(file)

@@ -67,6 +67,8 @@ def imported(folder: Path, **options: object) -> Path:
 
 def test_a_table_of_shapes_becomes_a_run(bench: Path) -> None:
     run = load_run(imported(bench, magnet_file=bench / "cube.toml"))
+    assert run.warnings == ()  # there is no photograph that a calibration would be for
+    assert "array(" not in repr(run)
     assert [step.gap_mm for step in run.steps] == list(GAPS_MM)
     assert [step.flux_mT for step in run.steps] == list(FLUX_MT)
     assert run.record["imported"]["table"] == "sources/steps.csv"
