@@ -201,7 +201,7 @@ def wrong_key(error: ValidationError, model: type[BaseModel]) -> str:
         return f"the key {key!r} is missing"
     if first["type"] == "too_short":
         return f"{key}: must hold at least {first['ctx']['min_length']} of them"
-    message = first["msg"].removeprefix("Value error, ")
+    message: str = first["msg"].removeprefix("Value error, ")
     message = message[0].lower() + message[1:]
     if not location:  # of the keys together: each of them is right by itself
         return message
