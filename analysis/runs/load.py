@@ -65,7 +65,7 @@ class Step:
     image: str
     flags: tuple[str, ...] = ()
     time_utc: str = ""
-    imported: Centreline | None = None
+    imported: Centreline | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
