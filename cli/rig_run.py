@@ -94,11 +94,13 @@ def run(
     from ..rig import read_plan
 
     checked = read_plan(plan)
+    readings_mT = _readings_mT(flux_mT, checked.gaps_mm)
     if dry_run:
+        if readings_mT:
+            require_plausible(checked, readings_mT)
         print_dry_run(checked, as_json)
         return
     folder = _run_folder(checked, out, resume)
-    readings_mT = _readings_mT(flux_mT, checked.gaps_mm)
     twin_seed = _twin_seed(checked, twin, seed, readings_mT)
     if speed is not None and twin_seed is None:
         raise InputError("--speed is of the twin's clock; real time has one speed")

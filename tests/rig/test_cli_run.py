@@ -181,3 +181,11 @@ def test_a_seed_below_zero_is_refused_before_anything_is_done(words):
     result = CliRunner().invoke(app, [*words, "--seed", "-1"])
     assert result.exit_code == 2
     assert "--seed" in result.output
+
+
+@pytest.mark.parametrize("readings", ["380,500,660", "66,50,38", "38,50", "nan,50,66"])
+def test_the_dry_run_refuses_the_readings_that_the_run_would(bench_folder, readings):
+    words = ["rig", "run", str(bench_folder / "plan.toml"), "--dry-run"]
+    result = CliRunner().invoke(app, [*words, "--flux-mT", readings])
+    assert result.exit_code != 0
+    assert "step " not in result.stdout
