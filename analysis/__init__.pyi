@@ -86,9 +86,6 @@ from .fit.nuisance import (
     Nuisance as Nuisance,
 )
 from .fit.posterior import (
-    Posterior as Posterior,
-)
-from .fit.posterior import (
     check_installed as check_installed,
 )
 from .fit.posterior import (
@@ -106,6 +103,15 @@ from .fit.proposals import (
 from .fit.proposals import (
     proposals as proposals,
 )
+from .fit.records import (
+    Posterior as Posterior,
+)
+from .fit.records import (
+    Suspect as Suspect,
+)
+from .fit.records import (
+    Verdict as Verdict,
+)
 from .fit.refit import (
     with_refitted as with_refitted,
 )
@@ -120,12 +126,6 @@ from .fit.runs import (
 )
 from .fit.runs import (
     try_fit as try_fit,
-)
-from .fit.suspects import (
-    Suspect as Suspect,
-)
-from .fit.verdict import (
-    Verdict as Verdict,
 )
 from .imports.door import (
     read_shape as read_shape,

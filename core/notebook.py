@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -12,14 +13,14 @@ if TYPE_CHECKING:
 _ROWS = 12
 
 
-class Tabular:
+class Tabular(ABC):
     """Base of results that are shown as a table by a notebook."""
 
     __slots__ = ()
 
+    @abstractmethod
     def to_dataframe(self) -> pd.DataFrame:
         """Return the numbers as a tidy table, units in the names of its columns."""
-        raise NotImplementedError
 
     def _repr_html_(self) -> str:
         table = self.to_dataframe()

@@ -3,13 +3,37 @@
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
-if TYPE_CHECKING:
-    from .panel import Panel
+from .bench.field import FieldWatch
+from .bench.owner import BenchOwner
+from .bench.sight import Sight
+from .hub import Hub
+from .journal import Journal
+from .runs.jobs import Jobs
+from .runs.supervisor import Supervisor
+from .workspace import Workspace
 
 
-def compose(panel: Panel) -> dict[str, Any]:
+class Parts(Protocol):
+    """What a panel is made of, as far as its state goes."""
+
+    workspace: Workspace
+    owner: BenchOwner
+    sight: Sight
+    field: FieldWatch
+    supervisor: Supervisor
+    jobs: Jobs
+    hub: Hub
+    journal: Journal
+
+    @property
+    def is_twin(self) -> bool:
+        """Whether the bench is the computed one."""
+        ...
+
+
+def compose(panel: Parts) -> dict[str, Any]:
     """Return the state that all pages share."""
     return {
         "beat": int(time.monotonic()),  # a page that hears nothing calls us lost
@@ -24,7 +48,7 @@ def compose(panel: Panel) -> dict[str, Any]:
     }
 
 
-def _files(panel: Panel) -> dict[str, Any]:
+def _files(panel: Parts) -> dict[str, Any]:
     files = panel.workspace.files()
     rig, specimen, calibration = files.rig, files.specimen, files.calibration
     return {
@@ -55,7 +79,7 @@ def _files(panel: Panel) -> dict[str, Any]:
     }
 
 
-def _bench(panel: Panel) -> dict[str, Any]:
+def _bench(panel: Parts) -> dict[str, Any]:
     view = panel.owner.view()
     parts = panel.owner.parts
     rig = panel.workspace.files().rig
@@ -79,7 +103,7 @@ def _bench(panel: Panel) -> dict[str, Any]:
     }
 
 
-def _run(panel: Panel) -> dict[str, Any]:
+def _run(panel: Parts) -> dict[str, Any]:
     supervisor = panel.supervisor
     return {
         "facts": supervisor.facts,

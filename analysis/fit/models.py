@@ -3,45 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 from ... import sim
 from .problem import MODELS
+from .records import ModelFit, Suspect
 from .result import FitResult
 from .search import Limits
-from .suspects import Suspect, alternative
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ModelFit:
-    """One theory, fitted.
-
-    Attributes
-    ----------
-    model : str
-        Of `problem.MODELS`.
-    aic : float
-        Akaike's criterion, chi2 + 2 p: lower is better.
-    rms_um : float
-        What is left along the lines.
-    E_MPa : tuple of float
-        The moduli that this theory finds.
-    """
-
-    model: str
-    aic: float
-    rms_um: float
-    E_MPa: tuple[float, ...]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the words of ``fit.json``."""
-        return {
-            "model": self.model,
-            "aic": self.aic,
-            "rms_um": self.rms_um,
-            "E_MPa": list(self.E_MPa),
-        }
+from .suspects import alternative
 
 
 def compare_models(result: FitResult, limits: Limits) -> tuple[ModelFit, ...]:

@@ -9,77 +9,17 @@ derivatives where the fit ended.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import InputError, MagbendError, MissingExtraError
 from ...core.progress import Progress, silent
+from .records import Posterior
 from .residuals import misfit, residuals
 from .result import PRIOR_RANGE_MPA, FitResult
 
 Array = NDArray[np.float64]
-
-LONG_ENOUGH = 50.0
-"""Autocorrelation times that a chain must last (emcee's own advice)."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Posterior:
-    """Samples of the moduli.
-
-    Attributes
-    ----------
-    parameters : tuple of str
-        Columns of `samples`.
-    samples : ndarray, shape (n, p)
-        In MPa, after burn-in.
-    acceptance : float
-        Mean accepted share; 0.2 to 0.5 is healthy.
-    autocorrelation : float
-        Longest integrated autocorrelation time in steps, NaN if the chain is too short
-        to tell.
-    steps : int
-        Of each walker.
-    """
-
-    parameters: tuple[str, ...]
-    samples: Array
-    acceptance: float
-    autocorrelation: float
-    steps: int
-
-    @property
-    def doubt(self) -> str:
-        """A sentence on chains that are too short to be believed, else empty."""
-        needed = LONG_ENOUGH * self.autocorrelation
-        if self.steps >= needed:
-            return ""
-        if not math.isfinite(needed):
-            return (
-                f"{self.steps} steps are too few even to tell how long the chains must "
-                "be: the quantiles are not to be believed; ask for ten times as many"
-            )
-        return (
-            f"{self.steps} steps are too few: neighbouring samples agree over "
-            f"{self.autocorrelation:.0f} steps; ask for {math.ceil(needed)} or more"
-        )
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return quantiles for a machine."""
-        low, middle, high = np.quantile(self.samples, [0.025, 0.5, 0.975], axis=0)
-        return {
-            "parameters": list(self.parameters),
-            "q2_5": low.tolist(),
-            "median": middle.tolist(),
-            "q97_5": high.tolist(),
-            "acceptance": self.acceptance,
-            "autocorrelation_steps": self.autocorrelation,
-            "samples": len(self.samples),
-            "doubt": self.doubt,
-        }
 
 
 def check_installed() -> None:

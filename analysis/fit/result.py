@@ -22,14 +22,12 @@ from ...core.notebook import Tabular, axes_or_new
 from ...core.specimen import Specimen
 from .linear import Linear, budget, linear_problem, marginal, statistical
 from .problem import Problem
+from .records import Posterior, Verdict
 from .residuals import distances_mm, residuals
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
-
-    from .posterior import Posterior
-    from .verdict import Verdict
 
 Array = NDArray[np.float64]
 

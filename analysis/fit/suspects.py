@@ -8,8 +8,7 @@ along the rod, a stiffness that changes gradually, the length of one section.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from ...core.errors import MagbendError
 from ...core.specimen import Specimen
 from .nuisance import unit_of
 from .problem import Problem, with_prior
+from .records import Suspect
 from .residuals import residuals
 from .result import FitResult, result_of
 from .search import Limits, nearby, on_bounds, priors
@@ -30,50 +30,6 @@ FEW = 4
 
 FREE = 30.0
 """Prior standard deviations that count as no prior."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Suspect:
-    """A change, and what it gains.
-
-    Attributes
-    ----------
-    name : str
-        A nuisance, or another change (module docstring).
-    value, sd : float
-        Best value and its standard deviation; NaN where the change is a choice.
-    unit : str
-    delta_chi2 : float
-        How far the sum of squares falls.
-    key : (str, int)
-        The nuisance and what it is of (`Problem.nuisances`); empty for a choice.
-    """
-
-    name: str
-    value: float
-    sd: float
-    unit: str
-    delta_chi2: float
-    key: tuple[str, int] = ("", -1)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the words of ``fit.json``."""
-        return {
-            "name": self.name,
-            "value": self.value,
-            "sd": self.sd,
-            "unit": self.unit,
-            "delta_chi2": self.delta_chi2,
-        }
-
-    def sentence(self) -> str:
-        """Return the change in words."""
-        if math.isnan(self.value):
-            return f"{self.name} (chi2 falls by {self.delta_chi2:.3g})"
-        return (
-            f"{self.name} = {self.value:+.3g} +- {self.sd:.2g} {self.unit} "
-            f"(chi2 falls by {self.delta_chi2:.3g})"
-        )
 
 
 def scored(result: FitResult) -> list[Suspect]:

@@ -7,17 +7,15 @@ model is right it is even between 0 and 1.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from .models import ModelFit, better_models, compare_models
+from .models import better_models, compare_models
+from .records import Verdict
 from .result import FitResult
 from .search import Limits
-from .suspects import Suspect, refitted, scored
+from .suspects import refitted, scored
 
 Array = NDArray[np.float64]
 
@@ -28,48 +26,6 @@ SERIOUS_FLAGS = (
     "length_mismatch", "direction_doubtful", "joints_doubtful", "width_mismatch",
 )  # fmt: skip
 """Doubts of a photograph's measurement that a fit shares."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Verdict:
-    """Whether a fit can be believed.
-
-    Attributes
-    ----------
-    verdict : {"supported", "doubtful", "contradicted"}
-    p_value : float
-        How often a right model would look as bad.
-    reasons : tuple of str
-        Why it is not supported, a sentence each.
-    suspects : tuple of Suspect
-        Single changes that would explain the misfit, best first.
-    models : tuple of ModelFit
-        Theories of field and rod, each with its own moduli, best first.
-    flags : dict of str to int
-        Doubts of the measurement, and of how many photographs.
-    pulls : dict of str to float
-        How far each nuisance was pulled from its prior, in standard deviations.
-    """
-
-    verdict: str
-    p_value: float
-    reasons: tuple[str, ...]
-    suspects: tuple[Suspect, ...]
-    models: tuple[ModelFit, ...]
-    flags: dict[str, int]
-    pulls: dict[str, float]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the words of ``fit.json``."""
-        return {
-            "verdict": self.verdict,
-            "p_value": self.p_value,
-            "reasons": list(self.reasons),
-            "pulls": self.pulls,
-            "suspects": [suspect.as_dict() for suspect in self.suspects],
-            "models": [model.as_dict() for model in self.models],
-            "flags": self.flags,
-        }
 
 
 def judge(result: FitResult, limits: Limits) -> Verdict:

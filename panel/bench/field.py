@@ -5,13 +5,13 @@ from __future__ import annotations
 import threading
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ...core.errors import MagbendError
+from ..hub import Hub
+from ..workspace import Workspace
+from .owner import BenchOwner
 from .theory import model_flux_mT
-
-if TYPE_CHECKING:
-    from ..panel import Panel
 
 EVERY_S = 1.0
 NEAR_MM = 0.05
@@ -33,12 +33,16 @@ class FieldWatch:
 
     Parameters
     ----------
-    panel : Panel
-        Whose bench it is.
+    owner : BenchOwner
+        Who holds the bench.
+    workspace : Workspace
+        Its files.
+    hub : Hub
+        Told of a new reading.
     """
 
-    def __init__(self, panel: Panel) -> None:
-        self._panel = panel
+    def __init__(self, owner: BenchOwner, workspace: Workspace, hub: Hub) -> None:
+        self._owner, self._workspace, self._hub = owner, workspace, hub
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._work, name="meter", daemon=True)
         self._reading: Reading | None = None
@@ -63,7 +67,7 @@ class FieldWatch:
 
     def facts(self) -> dict[str, Any]:
         """Return the reading and the model's value, from any thread."""
-        gap_mm = self._panel.owner.gap_mm
+        gap_mm = self._owner.gap_mm
         reading = self._reading
         return {
             "status": reading.status if reading else None,
@@ -75,7 +79,7 @@ class FieldWatch:
         }
 
     def _model_mT(self, gap_mm: float | None) -> float | None:
-        files = self._panel.workspace.files()
+        files = self._workspace.files()
         magnet = files.rig.magnet if files.rig else None
         if gap_mm is None or gap_mm <= 0.0 or magnet is None or files.specimen is None:
             return None
@@ -83,10 +87,10 @@ class FieldWatch:
 
     def _work(self) -> None:
         while not self._ending.wait(EVERY_S):
-            parts = self._panel.owner.parts
-            gap_mm = self._panel.owner.gap_mm
-            stands = not self._panel.owner.view().doing
-            watched = self._panel.hub.is_watched
+            parts = self._owner.parts
+            gap_mm = self._owner.gap_mm
+            stands = not self._owner.view().doing
+            watched = self._hub.is_watched
             if parts is None or parts.meter is None or gap_mm is None:
                 self._reading = None
                 continue
@@ -102,4 +106,4 @@ class FieldWatch:
                     status=flux.status, flux_mT=flux.flux_mT, gap_mm=gap_mm,
                     at_s=time.monotonic(),
                 )  # fmt: skip
-            self._panel.hub.changed()
+            self._hub.changed()

@@ -2,6 +2,7 @@
 
 import {h, fill, say} from "./dom.js";
 import {client, command, connect, isLost, link, on, watchPicture} from "./link.js";
+import {act, toast} from "./actions.js";
 import * as bench from "./bench.js";
 import * as run from "./run.js";
 import * as runs from "./runs.js";
@@ -101,47 +102,6 @@ async function stop() {
     }
   }
   banners(link.state);
-}
-
-// Toasts and questions
-
-export function toast(text, kind = "") {
-  const note = h("p", {class: `toast ${kind}`}, text);
-  $("toasts").append(note);
-  setTimeout(() => note.remove(), 6000 + 40 * text.length);
-}
-
-export function ask(title, text, yes) {
-  const dialog = $("ask");
-  say($("ask-title"), title);
-  say($("ask-text"), text);
-  say($("ask-yes"), yes);
-  // Not modal: the stop must stay within reach of pointer and keyboard.
-  dialog.show();
-  $("ask-yes").focus();
-  return new Promise((resolve) => {
-    dialog.addEventListener("close", () => resolve(dialog.returnValue === "yes"), {once: true});
-    dialog.returnValue = "no";
-  });
-}
-
-/** Send a command, ask for the controls if another page has them, and say what came of it. */
-export async function act(name, values = {}, quiet = false) {
-  try {
-    const answer = await command(name, values);
-    if (!quiet && answer.text) toast(answer.text);
-    return answer;
-  } catch (error) {
-    if (error.why === "not yours" && (await takeOver(error.message))) return act(name, values, quiet);
-    if (error.why !== "not yours") toast(error.message, "bad");
-    return null;
-  }
-}
-
-async function takeOver(why) {
-  const sure = await ask("Take over the controls?", `${why[0].toUpperCase()}${why.slice(1)}. The other page will only watch from then on.`, "Take over");
-  if (sure) await command("take", {over: true});
-  return sure;
 }
 
 async function controlsPressed() {

@@ -1,6 +1,6 @@
 // The bench: live picture with theory over it, the gap to scale, and what moves the stage.
 
-import {act, ask, toast} from "./app.js";
+import {act, ask, toast} from "./actions.js";
 import {field, fill, h, num, s, say, typed} from "./dom.js";
 import {drawGap} from "./gap.js";
 import {picture} from "./picture.js";

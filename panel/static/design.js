@@ -1,6 +1,6 @@
 // Draw a wanted curve on the picture; get rods that take it, with their bands.
 
-import {act, toast} from "./app.js";
+import {act, toast} from "./actions.js";
 import {field, fill, h, say, typed} from "./dom.js";
 import {link} from "./link.js";
 import {draw, pointing, showImage} from "./pointing.js";

@@ -1,6 +1,6 @@
 // Point at clamp, tip and ruler in a photograph that is not measured by itself.
 
-import {act, toast} from "./app.js";
+import {act, toast} from "./actions.js";
 import {field, fill, h, say, typed} from "./dom.js";
 import {query} from "./link.js";
 import {draw, pointing, showImage} from "./pointing.js";

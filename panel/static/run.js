@@ -1,6 +1,6 @@
 // A run: the plan with what it should show, the run itself, and what is made of it.
 
-import {act, ask, toast} from "./app.js";
+import {act, ask, toast} from "./actions.js";
 import {clock, field, fill, h, num, s, say, typed} from "./dom.js";
 import {query} from "./link.js";
 import {picture} from "./picture.js";

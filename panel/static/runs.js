@@ -1,6 +1,6 @@
 // The folder of runs: how each ended, what was made of it, and what to make of several.
 
-import {act, toast} from "./app.js";
+import {act, toast} from "./actions.js";
 import {fill, h, num, say} from "./dom.js";
 import {query} from "./link.js";
 import {afterButtons, flags, showJobs} from "./run.js";

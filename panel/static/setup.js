@@ -1,6 +1,6 @@
 // The guided path: each step says what it needs, does it, and can be done again.
 
-import {act, ask, toast} from "./app.js";
+import {act, ask, toast} from "./actions.js";
 import {field, fill, h, num, say, typed} from "./dom.js";
 import {link, query} from "./link.js";
 import {markPoints, picture} from "./picture.js";
