@@ -217,11 +217,11 @@ from .recipe.rods import (
 from .report.build import (
     write_report as write_report,
 )
+from .runs.data import (
+    RunData as RunData,
+)
 from .runs.field_scan import (
     judge_scan as judge_scan,
-)
-from .runs.load import (
-    RunData as RunData,
 )
 from .runs.load import (
     load_run as load_run,

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from magbend.analysis import FitResult, fit_runs, load_run
-from magbend.analysis.runs.load import RunData
+from magbend.analysis.runs.data import RunData
 from magbend.analysis.twin.bench import HiddenTruth
 from magbend.analysis.twin.lines import lines_run
 from magbend.analysis.twin.run import bench_run

@@ -55,7 +55,9 @@ class Panel:
         self.sight = Sight(
             self._grab, self._measure, self._pace_s, self.hub.show, self.hub.draw
         )
-        self.field = FieldWatch(self.owner, workspace, self.hub)
+        self.field = FieldWatch(
+            self.owner, workspace, self.hub.changed, lambda: self.hub.is_watched
+        )
         self.supervisor = Supervisor(workspace, self.hub.changed)
         self.supervisor.over = self.connect
         self.jobs = Jobs(workspace, self.hub.changed)

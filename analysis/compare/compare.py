@@ -24,7 +24,7 @@ from ...core.magnet import Magnet
 from ...core.notebook import Tabular, axes_or_new, plot_line
 from ...core.specimen import Specimen
 from ...core.text import defused
-from ..runs.load import Frame, RunData, Step
+from ..runs.data import Frame, RunData, Step
 from . import metrics
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...core.errors import InputError
 from ...sim import magnet_flux_mT
 from ..compare.compare import Comparison, RunComparison
-from ..runs.load import Frame
+from ..runs.data import Frame
 from .style import (
     BAD,
     FAINT,

@@ -19,7 +19,7 @@ from ...core.centreline import Centreline
 from ...core.errors import InputError, SolverError, StoreError
 from ...core.specimen import Specimen
 from ..compare.compare import field_of, frame_problem, usable_flux
-from ..runs.load import RunData, Step
+from ..runs.data import RunData, Step
 from .noise import FLOOR_MM, mode_matrix, spectrum, stated_mm
 from .nuisance import Nuisance, Owner, scope_of
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ... import sim
 from ...core.errors import MagbendError
 from ...core.units import GRAVITY_M_PER_S2
-from ..runs.load import RunData
+from ..runs.data import RunData
 from .linear import covariance_of
 from .model import rod_of, values_of
 from .noise import mode_matrix

@@ -9,7 +9,7 @@ import numpy as np
 
 from ... import sim
 from ...core.errors import MagbendError, SolverError
-from ..runs.load import RunData
+from ..runs.data import RunData
 from .model import shape_of, values_of, with_bow
 from .noise import noise_mm, stated_mm
 from .nuisance import Nuisance

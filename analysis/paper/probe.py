@@ -24,7 +24,7 @@ from ...core.checks import finite, positive
 from ...core.errors import InputError
 from ...core.table import read_table
 from ...sim import gmc
-from ..runs.load import RunData
+from ..runs.data import RunData
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from ...core.errors import StoreError
 from ..fit.nuisance import scope_of
 from ..fit.result import FitResult
 from ..fit.runs import fit_runs
-from ..runs.load import RunData
+from ..runs.data import RunData
 from .material import Mixture, mixtures
 
 Array = NDArray[np.float64]

@@ -22,7 +22,7 @@ from ..figures.several import paper_figure, summary_figure
 from ..figures.style import safe_name, to_pdf, to_svg
 from ..fit.models import model_sentence
 from ..fit.result import FitResult
-from ..runs.load import Step
+from ..runs.data import Step
 from .budget import BudgetLine, tip_budget
 from .photos import photo_settings, photograph_svg
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ...core.centreline import Centreline
 from ...core.errors import SolverError
 from ...core.magnet import Vector
-from ..runs.load import Frame, RunData, Step
+from ..runs.data import Frame, RunData, Step
 from .bench import TwinBench
 
 Array = NDArray[np.float64]

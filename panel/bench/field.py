@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from ...core.errors import MagbendError
-from ..hub import Hub
 from ..workspace import Workspace
 from .owner import BenchOwner
 from .theory import model_flux_mT
@@ -37,12 +37,21 @@ class FieldWatch:
         Who holds the bench.
     workspace : Workspace
         Its files.
-    hub : Hub
+    changed : callable
         Told of a new reading.
+    is_watched : callable
+        Whether a page is open.
     """
 
-    def __init__(self, owner: BenchOwner, workspace: Workspace, hub: Hub) -> None:
-        self._owner, self._workspace, self._hub = owner, workspace, hub
+    def __init__(
+        self,
+        owner: BenchOwner,
+        workspace: Workspace,
+        changed: Callable[[], None],
+        is_watched: Callable[[], bool],
+    ) -> None:
+        self._owner, self._workspace = owner, workspace
+        self._changed, self._is_watched = changed, is_watched
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._work, name="meter", daemon=True)
         self._reading: Reading | None = None
@@ -90,7 +99,7 @@ class FieldWatch:
             parts = self._owner.parts
             gap_mm = self._owner.gap_mm
             stands = not self._owner.view().doing
-            watched = self._hub.is_watched
+            watched = self._is_watched()
             if parts is None or parts.meter is None or gap_mm is None:
                 self._reading = None
                 continue
@@ -106,4 +115,4 @@ class FieldWatch:
                     status=flux.status, flux_mT=flux.flux_mT, gap_mm=gap_mm,
                     at_s=time.monotonic(),
                 )  # fmt: skip
-            self._hub.changed()
+            self._changed()

@@ -20,7 +20,7 @@ from magbend.analysis.compare.export import export_runs
 from magbend.analysis.imports.judge import Reading
 from magbend.analysis.imports.run import import_table
 from magbend.analysis.imports.steps import read_steps, write_template
-from magbend.analysis.runs.load import RunData
+from magbend.analysis.runs.data import RunData
 from magbend.cli.main import app
 from magbend.core.centreline import Centreline
 from magbend.core.errors import InputError

@@ -26,7 +26,7 @@ from magbend.analysis.design.goals import radius_goal
 from magbend.analysis.design.makeable import Makeable
 from magbend.analysis.design.mixtures import mixed_recipes
 from magbend.analysis.design.search import find_designs
-from magbend.analysis.runs.load import RunData
+from magbend.analysis.runs.data import RunData
 from magbend.analysis.twin.bench import TwinBench
 from magbend.analysis.twin.deviations import deviating, drawn
 from magbend.analysis.twin.lines import lines_run

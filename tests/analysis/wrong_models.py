@@ -12,7 +12,7 @@ import numpy as np
 
 from magbend import sim
 from magbend.analysis.fit.nuisance import Nuisance
-from magbend.analysis.runs.load import RunData
+from magbend.analysis.runs.data import RunData
 from magbend.analysis.twin.bench import HiddenTruth, TwinBench
 from magbend.analysis.twin.deviations import deviating, drawn
 from magbend.analysis.twin.lines import LineErrors, lines_run
