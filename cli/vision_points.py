@@ -70,7 +70,10 @@ def points(
         made_with=[calibration] if calibration else [],
     )
     if not found.ok:
-        raise VisionError(f"{photo}: {found.reason}")
+        raise VisionError(
+            f"{photo}: {found.reason}; see that --clamp and --tip lie on the rod, in "
+            "pixels from the upper left"
+        )
     if json:
         print_json(
             {

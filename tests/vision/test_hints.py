@@ -140,6 +140,9 @@ def test_a_refused_photograph_is_rescued_into_its_tables(frame, plain, tmp_path)
     assert (tmp_path / "out" / "overlays" / "b.png").is_file()
     rescue(tmp_path / "b.png", tmp_path / "out", setting, hints_of(plain))
     assert len(read_frames(tmp_path / "out" / "frames.csv")) == 2
+    away = Hints(clamp_px=(700.0, 40.0), tip_px=(860.0, 60.0))
+    assert not rescue(tmp_path / "b.png", tmp_path / "out", setting, away).ok
+    assert all(row.ok for row in read_frames(tmp_path / "out" / "frames.csv"))
     noted = {one.name: one.status for one in check_derived(tmp_path / "out")}
     assert noted["frames.csv"] == noted["overlays/b.png"] == "good"
 

@@ -50,7 +50,8 @@ def rescue(
     Returns
     -------
     Measurement
-        As it was entered; failed, with a reason, if no rod is between the points.
+        As it was entered; failed, with a reason, if no rod is between the points: that
+        replaces no row that was measured.
 
     Raises
     ------
@@ -63,6 +64,9 @@ def rescue(
     setting = with_ruler(photo, setting, hints)
     found = measure_hinted(photo, setting, hints)
     with owning_folder(out, "extraction", "vision points", ours=is_made_by_us):
+        known = {done.row.image for done in _read(out) if done.row.ok}
+        if not found.ok and path.name in known:
+            return found
         made = _enter(path, out, photo, setting, hints, found)
         note_derived(made, sources=[path, *made_with], command="vision points")
     return found
