@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ...core.door import open_file
 from ...core.errors import ConfigError, InputError
 from .drawing import read_dxf, read_svg
 from .judge import Reading, Shape, judged
@@ -63,10 +64,8 @@ def _with_lines(blocks: list[Block]) -> list[Block]:
 
 def _start(path: Path) -> bytes:
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             return file.read(512)
-    except FileNotFoundError:
-        raise ConfigError(f"{path}: there is no such file") from None
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
 

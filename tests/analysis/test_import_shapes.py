@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -346,3 +347,10 @@ def test_a_missing_file_and_a_folder_are_one_sentence(tmp_path: Path) -> None:
         read_shapes(tmp_path / "none.csv")
     with pytest.raises(ConfigError, match="cannot be read"):
         read_shapes(tmp_path)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_in_place_of_a_shape_is_refused_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "curve.csv")
+    with pytest.raises(ConfigError, match="is a pipe or a device, not a file"):
+        read_shape(tmp_path / "curve.csv")
