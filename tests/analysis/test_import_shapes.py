@@ -345,7 +345,7 @@ def test_what_a_file_brings_is_kept_to_the_last_digit(tmp_path: Path) -> None:
 def test_a_missing_file_and_a_folder_are_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="no such file"):
         read_shapes(tmp_path / "none.csv")
-    with pytest.raises(ConfigError, match="cannot be read"):
+    with pytest.raises(ConfigError, match="is a folder, not a file"):
         read_shapes(tmp_path)
 
 
@@ -353,4 +353,4 @@ def test_a_missing_file_and_a_folder_are_one_sentence(tmp_path: Path) -> None:
 def test_a_pipe_in_place_of_a_shape_is_refused_and_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "curve.csv")
     with pytest.raises(ConfigError, match="is a pipe or a device, not a file"):
-        read_shape(tmp_path / "curve.csv")
+        read_shapes(tmp_path / "curve.csv")
