@@ -76,6 +76,7 @@ class RunFolder:
             raise StoreError(f"{path}: exists and is not an empty folder")
         with _store_errors(path):
             (path / IMAGES).mkdir(parents=True, exist_ok=True)
+            _sweep(path)
             write_text(path / PLAN_FILE, plan_text)
             sync_folder(path.parent)
             digest = file_digest(path / PLAN_FILE)
@@ -110,8 +111,7 @@ class RunFolder:
                 if whole.torn:
                     _truncate(path / name, whole.whole_bytes)
             (path / IMAGES).mkdir(exist_ok=True)
-            for leftover in path.rglob(".*.tmp"):
-                leftover.unlink()
+            _sweep(path)
             if log is not None:
                 log.start(path / WIRE_FILE)
         done = {step["index"]: str(step.get("seal", "")) for step in lines.steps}
@@ -256,6 +256,12 @@ def _last_seal(path: Path) -> str:
 
 def _size(path: Path) -> int:
     return path.stat().st_size if path.exists() else 0
+
+
+def _sweep(path: Path) -> None:
+    """Remove what a killed attempt left half written; the folder is ours."""
+    for leftover in path.rglob(".*.tmp"):
+        leftover.unlink()
 
 
 def _foreign(path: Path) -> bool:

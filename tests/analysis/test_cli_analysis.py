@@ -107,7 +107,7 @@ def test_out_is_refused_before_the_work_and_its_folders_are_made(
     (tmp_path / "file").write_text("")
     bad = tmp_path / "file" / "out.csv"
     with monkeypatch.context() as patch:
-        for work in ("compare.compare.compare_run", "fit.runs.fit_runs"):
+        for work in ("compare_run", "fit_runs"):
             patch.setattr(f"magbend.analysis.{work}", _must_not_be_called)
         code, _, err = call(capsys, patch, command, run, "--out", bad)
     assert code == 1

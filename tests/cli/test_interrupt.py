@@ -32,9 +32,7 @@ def interrupted(monkeypatch: pytest.MonkeyPatch, where: str, *arguments: str) ->
 def test_a_command_says_that_it_was_stopped(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    code = interrupted(
-        monkeypatch, "magbend.sim.magnet.fit.fit_magnet", "sim", "magnet"
-    )
+    code = interrupted(monkeypatch, "magbend.sim.fit_magnet", "sim", "magnet")
     assert code == 130
     out, err = capsys.readouterr()
     assert out == ""

@@ -209,3 +209,16 @@ def test_verify_names_what_is_missing_altered_or_extra(path, harm, problem) -> N
     assert verify_run(path) == []
     harm(path)
     assert any(problem in line for line in verify_run(path)), verify_run(path)
+
+
+def test_a_run_begun_anew_leaves_no_half_of_the_attempt_that_was_killed(
+    path: Path,
+) -> None:
+    path.mkdir()
+    (path / ".run.json.b3c5011e.tmp").write_text("{")
+    folder = RunFolder.create(path, MANIFEST, "plan")
+    commit(folder, 0)
+    commit(folder, 1)
+    folder.finish("success", "done")
+    assert verify_run(path) == []
+    assert not list(path.glob(".*.tmp"))

@@ -205,7 +205,7 @@ def test_sweep_refuses_its_folder_before_it_solves(
     def began(*_: object, **__: object) -> None:
         raise AssertionError("the work began before --out was checked")
 
-    monkeypatch.setattr("magbend.sim.study.sweep.sweep", began)
+    monkeypatch.setattr("magbend.sim.sweep", began)
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="a file stands where a folder belongs"):
         run("sweep", "field", "--out", str(tmp_path / "file"))
