@@ -76,8 +76,14 @@ def path(
         "insertion_mm": insertion_mm,
     }  # fmt: skip
     legs = {name: text for name, text in given.items() if text and ":" in text}
-    if len(legs) != 1:
+    if not legs:
         raise typer.BadParameter(f"give one option {_HOW}, such as --gap-mm 120:30:120")
+    if len(legs) > 1:
+        both = " and ".join(f"{_option(name)} {text}" for name, text in legs.items())
+        raise typer.BadParameter(
+            f"one quantity at a time runs along a path, but {both} were given; leave "
+            f"one of them {_HOW} and give the others as one number, or not at all"
+        )
     quantity, text = next(iter(legs.items()))
     fixed = {name: text for name, text in given.items() if name not in legs and text}
     rod = rod_of(gmc, specimen)
@@ -99,6 +105,10 @@ def path(
         print_json(_data(rod.name, found))
     else:
         _print(rod.name, found, [out, figure, animation])
+
+
+def _option(name: str) -> str:
+    return "--field-mT" if name == "flux_mT" else f"--{name.replace('_', '-')}"
 
 
 def _number(option: str, text: str | None) -> float | None:

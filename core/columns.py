@@ -45,6 +45,9 @@ class Table:
         Comment lines, without their sign.
     decimal_comma : bool
         Whether numbers are written 1,5.
+    stray_point : str
+        What made `decimal_comma` false although numbers are written so: a number 1.5
+        among them, and where it stands.
     """
 
     path: Path
@@ -53,6 +56,7 @@ class Table:
     lines: tuple[int, ...]
     comments: tuple[str, ...] = ()
     decimal_comma: bool = False
+    stray_point: str = ""
 
     @property
     def width(self) -> int:
@@ -175,6 +179,11 @@ class Table:
 
     def _cause(self, cell: str) -> str:
         text = cell.strip()
+        if self.stray_point and COMMA_NUMBER.fullmatch(text):
+            return (
+                f", but {self.stray_point}: write all decimals of the file with a "
+                "point, or all with a comma"
+            )
         if "_" in text:
             return "; write it without an underscore"
         if THOUSANDS.fullmatch(text) and "," in text:

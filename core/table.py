@@ -85,13 +85,16 @@ def parse_table(
     rows = [(n, row) for n, row in rows if any(cell.strip() for cell in row)]
     if needs_rows and not rows:
         raise ConfigError(f"{path}: must hold at least one row below its heads")
+    decimal_comma = separator != "," and _has_decimal_commas(rows, separator)
+    stray = _stray_point(rows, names) if decimal_comma else ""
     return Table(
         path=path,
         names=tuple(names),
         rows=tuple(row for _, row in rows),
         lines=tuple(n for n, _ in rows),
         comments=tuple(lines[i].strip()[1:].strip() for i in said),
-        decimal_comma=separator != "," and _has_decimal_commas(rows, separator),
+        decimal_comma=decimal_comma and not stray,
+        stray_point=stray,
     )
 
 
@@ -232,15 +235,25 @@ def _fitted(
 def _has_decimal_commas(
     rows: Sequence[tuple[int, tuple[str, ...]]], separator: str
 ) -> bool:
-    """Return whether commas are decimal: no points, and not only thousands."""
+    """Return whether commas are decimal, and not only thousands."""
     with_comma = [
         cell.strip() for _, row in rows for cell in row
         if "," in cell and COMMA_NUMBER.fullmatch(cell.strip())
     ]  # fmt: skip
     if not with_comma:
         return False
-    if separator != ";" and all(THOUSANDS.fullmatch(cell) for cell in with_comma):
-        return False
-    return not any(
-        re.fullmatch(r"[+-]?\d*\.\d+", cell.strip()) for _, row in rows for cell in row
-    )
+    if all(THOUSANDS.fullmatch(cell) for cell in with_comma):
+        return separator == ";" and not _stray_point(rows, [])
+    return True
+
+
+def _stray_point(
+    rows: Sequence[tuple[int, tuple[str, ...]]], names: Sequence[str]
+) -> str:
+    """Return the first decimal with a point, and where it stands; empty if none."""
+    for line, row in rows:
+        for at, cell in enumerate(row):
+            if re.fullmatch(r"[+-]?\d*\.\d+", cell.strip()):
+                column = names[at] if at < len(names) else f"column {at + 1}"
+                return f"line {line} has {cell.strip()} in {column}"
+    return ""

@@ -72,6 +72,10 @@ REFUSED = {
     "underscore": (b"x_mm,y_mm\n1_000,2\n", "line 2: x_mm.*1_000.*underscore"),
     "thousands": (b'x_mm\ty_mm\n"1,250"\t2\n', "line 2.*thousands"),
     "points and commas": (b"x_mm;y_mm\n1,5;2.5\n", "line 2.*with a point"),
+    "a stray point in another column": (
+        b"x_mm;y_mm;warmth\n70,0;1,5;21,5\n60,0;2,5;21.5\n",
+        "line 2: x_mm .*'70,0', but line 3 has 21.5 in warmth: write all decimals",
+    ),
     "a unit behind a decimal comma": (b"x_mm;y_mm\n38,0 mm;2,5\n", "unit in the head"),
     "German thousands": (b"x_mm;y_mm\n1.250,5;2,5\n", "thousands without a point"),
     "a unit in the cell": (b"x_mm,y_mm\n38 mm,2\n", "line 2.*unit in the head"),

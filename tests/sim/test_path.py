@@ -196,3 +196,6 @@ def test_the_command_says_points_and_folds(tmp_path: Path) -> None:
     }  # fmt: skip
     assert found["folds"][0]["direction"] == "falling"
     assert CliRunner().invoke(cli.app, options).exit_code == 2
+    twice = [*options, "--gap-mm", "120:30:120", "--field-mT", "10:20"]
+    said = " ".join(CliRunner().invoke(cli.app, twice).output.replace("│", "").split())
+    assert "--gap-mm 120:30:120 and --field-mT 10:20 were given" in said
