@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from ..core.errors import InputError
-from .console import JSON, print_json, progress
+from .console import JSON, print_json, progress, say
 
 if TYPE_CHECKING:
     from ..analysis import ImportedRun
@@ -108,20 +108,20 @@ def _tell(
 ) -> None:
     for run in done:
         for note in run.notes:
-            typer.echo(f"note: {note}", err=True)
-        typer.echo(
+            say(f"note: {note}", err=True)
+        say(
             f"{run.path}: {run.steps} steps, {run.centrelines} centrelines, "
             f"{run.simulated} simulated shapes"
         )
     if page:
-        typer.echo(page)
+        say(page)
         return
     if all(run.centrelines for run in done):
-        typer.echo(f"next: magbend analysis report {out}")
+        say(f"next: magbend analysis report {out}")
         return
     for run in done:
         file = run.path / "calibration.json" if calibration else "CALIBRATION"
-        typer.echo(
+        say(
             f"next: magbend vision extract {run.path} --calibration {file} "
             f"--out {run.path}"
         )
@@ -131,7 +131,7 @@ def _template(path: Path, *, as_json: bool) -> None:
     if as_json:
         print_json({"table": str(path)})
         return
-    typer.echo(
+    say(
         f"{path}: fill in gaps and readings, then magbend analysis import {path} "
         "--specimen S.toml --out RUN"
     )

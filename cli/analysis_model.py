@@ -7,7 +7,7 @@ from pathlib import Path
 import typer
 
 from . import design, library, surrogate
-from .console import JSON, print_json, progress
+from .console import JSON, print_json, progress, say
 
 
 def train(
@@ -48,16 +48,16 @@ def train(
     if as_json:
         print_json(report.as_dict())
         return
-    typer.echo("test mean squared error of a (1/mm2), one row a seed:")
-    typer.echo("seed  random field   top field      one whole GMC")
+    say("test mean squared error of a (1/mm2), one row a seed:")
+    say("seed  random field   top field      one whole GMC")
     columns = report.test_mse_per_mm2
     for seed in range(seeds):
         row = "   ".join(f"{columns[split][seed]:12.3e}" for split in columns)
-        typer.echo(f"{seed:4d}  {row}")
+        say(f"{seed:4d}  {row}")
     for name, pick in (("median", 0.5), ("worst", 1.0)):
         row = "   ".join(f"{_quantile(columns[s], pick):12.3e}" for s in columns)
-        typer.echo(f"{name:>6s}{row}")
-    typer.echo(f"the paper reports {published:g} on the first of the three splits")
+        say(f"{name:>6s}{row}")
+    say(f"the paper reports {published:g} on the first of the three splits")
 
 
 TRAIN_EXAMPLE = "Example: magbend analysis train --seeds 10 --figure mse.svg"
@@ -116,11 +116,11 @@ def predict(
             }
         )
         return
-    typer.echo(f"y = a x^2 with a = {a_per_mm:.6g} 1/mm")
+    say(f"y = a x^2 with a = {a_per_mm:.6g} 1/mm")
     error = errors["specimen" if warnings else "field"]["median_test_mse_per_mm2"]
-    typer.echo(f"typical error of a: {error**0.5:.2g} 1/mm")
+    say(f"typical error of a: {error**0.5:.2g} 1/mm")
     for warning in warnings:
-        typer.echo(f"warning: {warning}", err=True)
+        say(f"warning: {warning}", err=True)
 
 
 PREDICT_EXAMPLE = "Example: magbend analysis predict --gmc 2 --field-mT 50"

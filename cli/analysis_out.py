@@ -7,7 +7,7 @@ from pathlib import Path
 import typer
 
 from .analysis_runs import compared
-from .console import JSON, print_json, progress
+from .console import JSON, print_json, progress, say
 from .run_options import RUNS, UNVERIFIED, loaded_runs, tell_left_out
 
 _NO_FIT = typer.Option(False, "--no-fit", help="Leave the fit out.")
@@ -46,7 +46,7 @@ def figures(
         print_json({"files": [str(path) for path in written], "left_out": left_out})
         return
     for path in written:
-        typer.echo(str(path))
+        say(str(path))
     tell_left_out(left_out, len(done))
 
 
@@ -67,7 +67,7 @@ def export(
     check_export(out)
     done = compared(loaded, left_out, "rod")
     for path in export_runs(done, out):
-        typer.echo(str(path))
+        say(str(path))
     tell_left_out(left_out, len(done))
 
 
@@ -102,5 +102,5 @@ def package(
     if json:
         print_json({"package": str(out), "files": files, "left_out": left_out})
         return
-    typer.echo(f"{out}: {files} files of {len(done)} runs")
+    say(f"{out}: {files} files of {len(done)} runs")
     tell_left_out(left_out, len(done))

@@ -12,7 +12,7 @@ import typer
 from ..core.errors import InputError, MagbendError
 from ..core.progress import silent
 from .analysis_show import print_comparison
-from .console import JSON, print_json, progress
+from .console import JSON, print_json, progress, say
 from .run_options import (
     CLAMP,
     GRAVITY,
@@ -130,12 +130,12 @@ def report(
         )
         return
     for comparison in failed:
-        typer.echo(
+        say(
             f"{comparison.run}, step {comparison.step.index}: {comparison.status}",
             err=True,
         )
     tell_left_out(left_out, len(done))
-    typer.echo(str(files.html))
+    say(str(files.html))
 
 
 def paper(
@@ -154,8 +154,8 @@ def paper(
     if json:
         print_json(result.as_dict())
         return
-    typer.echo(result.sentence())
-    typer.echo(str(result.html))
+    say(result.sentence())
+    say(str(result.html))
 
 
 def audit(
@@ -174,8 +174,8 @@ def audit(
         print_json([finding.as_dict() for finding in findings])
         return
     for finding in findings:
-        typer.echo(f"{finding.verdict.upper():12} {finding.claim}")
-        typer.echo(f"{'':12} {finding.evidence}\n")
+        say(f"{finding.verdict.upper():12} {finding.claim}")
+        say(f"{'':12} {finding.evidence}\n")
 
 
 def probe(
@@ -208,15 +208,13 @@ def probe(
         if json:
             print_json({"remanence_mT": remanence, "standoff_mm": standoff})
         else:
-            typer.echo(
-                f"remanence {remanence:.1f} mT at a stand-off of {standoff:.3f} mm"
-            )
+            say(f"remanence {remanence:.1f} mT at a stand-off of {standoff:.3f} mm")
         return
     if json:
         print_json(found.as_dict())
         return
     for line in found.lines():
-        typer.echo(line)
+        say(line)
 
 
 def compared(

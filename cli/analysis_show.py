@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
+from ..core.text import printable
+from .console import say
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,13 +45,13 @@ def print_comparison(table: pd.DataFrame) -> None:
 
 def _cell(value: Any, form: str | None) -> str:
     if form is None:
-        return str(value)
+        return printable(str(value))
     return "-" if isinstance(value, float) and math.isnan(value) else f"{value:{form}}"
 
 
 def print_fit(result: FitResult, path: Path, posterior: dict[str, Any] | None) -> None:
     """Print what was fitted, how sure it is, and where it was written."""
-    typer.echo(
+    say(
         f"{result.specimen.name}: {result.steps} steps, model {result.model}, "
         f"{result.rms_um:.2g} um RMS left, reduced chi2 {result.chi2_reduced:.2f}, "
         f"condition number {result.condition_number:.3g}"
@@ -60,10 +61,10 @@ def print_fit(result: FitResult, path: Path, posterior: dict[str, Any] | None) -
         result.parameters, result.values, result.sd, again, strict=False
     ):
         if name in result.not_identifiable:
-            typer.echo(f"  {name:20} not identifiable")
+            say(f"  {name:20} not identifiable")
         else:
             noise = f"; +- {alone:.2g} statistical" if math.isfinite(alone) else ""
-            typer.echo(
+            say(
                 f"  {name:20} {value:.4g} +- {sd:.2g} ({100 * sd / value:.1f} %{noise})"
             )
     _print_budget(result)
@@ -72,27 +73,23 @@ def print_fit(result: FitResult, path: Path, posterior: dict[str, Any] | None) -
         for m in range(k):
             value = result.correlation[k, m]
             if abs(value) > 0.5:
-                typer.echo(
-                    f"  correlation of {result.parameters[m]}, {name}: {value:.2f}"
-                )
+                say(f"  correlation of {result.parameters[m]}, {name}: {value:.2f}")
     for sentence in result.directions:
-        typer.echo(f"not identifiable: {sentence}")
+        say(f"not identifiable: {sentence}")
     for name, (value, sd) in result.ratios.items():
-        typer.echo(f"  {name} = {value:.4g} +- {sd:.2g} is what the data tell")
+        say(f"  {name} = {value:.4g} +- {sd:.2g} is what the data tell")
     for sentence in result.skipped:
-        typer.echo(f"left out: {sentence}", err=True)
+        say(f"left out: {sentence}", err=True)
     if posterior and posterior["doubt"]:
-        typer.echo(f"posterior: {posterior['doubt']}", err=True)
+        say(f"posterior: {posterior['doubt']}", err=True)
     if posterior:
         for name, low, middle, high in zip(
             posterior["parameters"],
             *(posterior[key] for key in ("q2_5", "median", "q97_5")),
             strict=True,
         ):
-            typer.echo(
-                f"  posterior {name}: {middle:.4g} (95 %: {low:.4g} to {high:.4g})"
-            )
-    typer.echo(str(path))
+            say(f"  posterior {name}: {middle:.4g} (95 %: {low:.4g} to {high:.4g})")
+    say(str(path))
 
 
 def _print_budget(result: FitResult) -> None:
@@ -104,7 +101,7 @@ def _print_budget(result: FitResult) -> None:
         if max(share[:count]) > 0.001
     ]
     if shares:
-        typer.echo(f"  of the moduli's sd: {', '.join(shares[:6])}")
+        say(f"  of the moduli's sd: {', '.join(shares[:6])}")
 
 
 def _print_verdict(result: FitResult) -> None:
@@ -114,19 +111,19 @@ def _print_verdict(result: FitResult) -> None:
     verdict = result.verdict
     if verdict is None:
         return
-    typer.echo(f"verdict: {verdict.verdict} (p = {verdict.p_value:.2g})")
+    say(f"verdict: {verdict.verdict} (p = {verdict.p_value:.2g})")
     for sentence in verdict.reasons:
-        typer.echo(f"  {sentence}")
+        say(f"  {sentence}")
     title = "would explain it" if verdict.reasons else "no more than chance"
     for suspect in verdict.suspects[:3]:
-        typer.echo(f"  {title}: {suspect.sentence()}")
+        say(f"  {title}: {suspect.sentence()}")
     pulls = verdict.pulls.items()
     strong = [f"{of} {pull:+.1f}" for of, pull in pulls if abs(pull) > 2.0]
     if strong:
-        typer.echo(f"  pulled by more than 2 sd: {', '.join(strong)}")
+        say(f"  pulled by more than 2 sd: {', '.join(strong)}")
     sentence = model_sentence(verdict.models)
     if sentence:
-        typer.echo(f"  {sentence}")
+        say(f"  {sentence}")
 
 
 def print_proposals(
@@ -136,14 +133,12 @@ def print_proposals(
     now = [sd / value for value, sd in zip(result.E_MPa, result.E_sd_MPa, strict=True)]
     known = [100.0 * share for share in now if math.isfinite(share)]
     if known:
-        typer.echo(
-            f"{result.specimen.name}: the worst modulus is known to {max(known):.2g} %"
-        )
+        say(f"{result.specimen.name}: the worst modulus is known to {max(known):.2g} %")
     if not found:
-        typer.echo("nothing useful is done in that time: give --minutes more")
+        say("nothing useful is done in that time: give --minutes more")
     else:
-        typer.echo("sd, %  minutes  change")
+        say("sd, %  minutes  change")
     for one in found:
-        typer.echo(f"{one.predicted_sd_percent:5.2f}  {one.minutes:7.0f}  {one.change}")
+        say(f"{one.predicted_sd_percent:5.2f}  {one.minutes:7.0f}  {one.change}")
     for sentence in limits:
-        typer.echo(sentence)
+        say(sentence)

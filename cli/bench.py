@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from .console import print_json
+from .console import print_json, say
 
 DEMO_EXAMPLE = "Example: magbend demo --out demo"
 DOCTOR_EXAMPLE = "Example: magbend doctor --json"
@@ -42,8 +42,8 @@ def demo(
         return
     from ..analysis import run_demo
 
-    report = run_demo(out, seed=seed, tell=typer.echo)
-    typer.echo(str(report))
+    report = run_demo(out, seed=seed, tell=say)
+    say(str(report))
 
 
 def doctor(
@@ -58,9 +58,7 @@ def doctor(
     else:
         width = max(len(finding.subject) for finding in findings)
         for finding in findings:
-            typer.echo(
-                f"{finding.status:7} {finding.subject:{width}}  {finding.detail}"
-            )
+            say(f"{finding.status:7} {finding.subject:{width}}  {finding.detail}")
     if any(finding.status == "broken" for finding in findings):
         raise typer.Exit(1)
 
@@ -72,7 +70,7 @@ def examples(
     from ..analysis import copy_examples
 
     for path in copy_examples(out):
-        typer.echo(str(path))
+        say(str(path))
 
 
 def schema(
@@ -90,6 +88,6 @@ def schema(
 
     if out is not None:
         for path in write_toml_schemas(out):
-            typer.echo(str(path))
+            say(str(path))
         return
     print_json(toml_schema(kind))

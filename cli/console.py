@@ -12,6 +12,7 @@ import typer
 
 from ..core.json import dump_json
 from ..core.progress import Progress
+from ..core.text import printable, printable_json
 
 JSON = typer.Option(False, "--json", help="Print JSON for a machine.")
 """The option of every command whose result a machine may read."""
@@ -29,9 +30,17 @@ def group(name: str, help_text: str, example: str) -> typer.Typer:
     )
 
 
+def say(text: object = "", *, err: bool = False) -> None:
+    """Print a line for people, without what a stranger's name would do to a terminal.
+
+    Names of files and folders come from outside; every command speaks through here.
+    """
+    typer.echo(printable(str(text)), err=err)
+
+
 def print_json(data: Any, *, indent: int | None = 2) -> None:
     """Print `data` as JSON; NaN becomes null, since JSON has no NaN."""
-    typer.echo(dump_json(data, indent=indent))
+    typer.echo(printable_json(dump_json(data, indent=indent)))
 
 
 @contextlib.contextmanager
@@ -96,6 +105,4 @@ class _PlainLines:
         elapsed = now - self._start
         left = elapsed * (total - done) / done if done else float("nan")
         remaining = f", {left:.0f} s left" if done and done < total else ""
-        typer.echo(
-            f"{self._what}: {done}/{total}, {elapsed:.0f} s{remaining}", err=True
-        )
+        say(f"{self._what}: {done}/{total}, {elapsed:.0f} s{remaining}", err=True)

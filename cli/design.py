@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from .analysis_import import ALIGN, FLIP, UNIT
-from .console import JSON, print_json
+from .console import JSON, print_json, say
 
 if TYPE_CHECKING:
     from ..analysis import Design, Goal, Makeable, Reading, Task
@@ -161,7 +161,7 @@ def design(
         return
     _print(found, goal)
     if len(found) < count:
-        typer.echo(f"only {len(found)} distinct designs were found", err=True)
+        say(f"only {len(found)} distinct designs were found", err=True)
 
 
 def _one(fluxes_mT: list[float]) -> float | None:
@@ -328,19 +328,19 @@ def _mixed(rod: Specimen) -> str:
 def _print(found: list[Design], goal: Goal) -> None:
     unit = {"radius": "mm", "angle": "deg"}.get(goal.kind, "mm")
     share = "%" if goal.kind in ("radius", "angle") else "mm"
-    typer.echo(f"{goal.words}:")
+    say(f"{goal.words}:")
     for number, one in enumerate(found, start=1):
         rod = one.specimen
         moduli = "-".join(f"{s.E_MPa:.4g}" for s in rod.sections)
         lengths = "-".join(f"{s.length_mm:.4g}" for s in rod.sections)
-        typer.echo(
+        say(
             f"{number}. side {rod.side_mm:.4g} mm, {moduli} MPa, {lengths} mm, "
             f"{rod.remanence_mT:g} mT{_mixed(rod)}: {one.achieved:.5g} {unit}, "
             f"error {one.error:.2g} {share}, tolerance {one.tolerance:.2g} {unit}"
         )
         for other in one.more:
             x_mm, y_mm = other.tip_mm
-            typer.echo(
+            say(
                 f"   and ({x_mm:.4g}, {y_mm:.4g}) mm, error {other.error:.2g} mm, "
                 f"tolerance {other.tolerance:.2g} mm"
             )

@@ -5,9 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
-from .console import print_json, progress
+from .console import print_json, progress, say
 
 if TYPE_CHECKING:
     from ..analysis import Makeable, Through
@@ -58,7 +56,7 @@ def design_lumen(
         rod = one.specimen
         moduli = "-".join(f"{s.E_MPa:.4g}" for s in rod.sections)
         lengths = "-".join(f"{s.length_mm:.4g}" for s in rod.sections)
-        typer.echo(
+        say(
             f"{rod.name}: side {rod.side_mm:.4g} mm, {moduli} MPa, {lengths} mm: "
             f"presses {1e3 * one.passage.most('wall_N'):.4g} mN on the walls, needs "
             f"{1e3 * one.passage.most('push_N'):.4g} mN"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from ..core.errors import RigError
+from .console import say
 from .keyboard import END, Keyboard, has_keys
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def jog_loop(stage: GapStage) -> None:
         raise RigError(
             "jogging needs a terminal with keys; in a script use magbend rig goto GAP"
         )
-    typer.echo(_HELP)
+    say(_HELP)
     step_mm = 1.0
     try:
         with Keyboard() as keyboard:
@@ -57,7 +58,7 @@ def jog_loop(stage: GapStage) -> None:
     except KeyboardInterrupt:
         return  # nothing moves while the loop waits for a key
     finally:
-        typer.echo("")
+        say("")
 
 
 def _act(stage: GapStage, key: str, step_mm: float, keyboard: Keyboard) -> None:

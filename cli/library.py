@@ -8,7 +8,7 @@ from typing import Any
 import typer
 
 from .analysis_import import ALIGN, FLIP, UNIT
-from .console import JSON, group, print_json, progress
+from .console import JSON, group, print_json, progress, say
 
 app = group(
     "library",
@@ -52,10 +52,10 @@ def build(
         print_json(asdict(summary))
         return
     solved, total = summary.solved_partitions, summary.partitions
-    typer.echo(f"{summary.designs} designs in {total} partitions in {out}")
-    typer.echo(f"{solved} partitions solved now, {total - solved} were there")
+    say(f"{summary.designs} designs in {total} partitions in {out}")
+    say(f"{solved} partitions solved now, {total - solved} were there")
     for name in summary.repaired:
-        typer.echo(f"warning: {name} was damaged and has been solved again", err=True)
+        say(f"warning: {name} was damaged and has been solved again", err=True)
 
 
 @app.command(epilog=QUERY_EXAMPLE)
@@ -108,7 +108,7 @@ def query(
         top=top,
     )  # fmt: skip
     if found.missing_partitions:
-        typer.echo(
+        say(
             f"warning: {found.missing_partitions} partitions are not built yet; "
             "the answer covers the others",
             err=True,
@@ -124,7 +124,7 @@ def query(
             }
         )
         return
-    typer.echo(f"{found.matched} of {found.designs} designs match")
+    say(f"{found.matched} of {found.designs} designs match")
     if out is None:
         _print_table(found.table.to_pylist())
 
@@ -150,7 +150,7 @@ def _print_table(rows: list[dict[str, object]]) -> None:
     widths = [max(len(cell) for cell in column) for column in lines]
     for line in [names, *cells]:
         padded = (c.rjust(w) for c, w in zip(line, widths, strict=True))
-        typer.echo("  ".join(padded))
+        say("  ".join(padded))
 
 
 def _cell(value: object) -> str:

@@ -8,8 +8,8 @@ import sys
 import typer
 
 from ..core.errors import MagbendError
-from ..core.text import printable
 from . import analysis, bench, migrate, panel, rig, sim, vision
+from .console import say
 
 app = typer.Typer(
     name="magbend",
@@ -36,7 +36,7 @@ def _print_version(wanted: bool) -> None:
     if wanted:
         from importlib.metadata import version
 
-        typer.echo(f"magbend {version('magbend')}")
+        say(f"magbend {version('magbend')}")
         raise typer.Exit
 
 
@@ -97,13 +97,13 @@ def _say_interrupted(end: BaseException | None) -> None:
     while end is not None and not isinstance(end, KeyboardInterrupt):
         end = end.__cause__ or end.__context__
     notes = getattr(end, "__notes__", [])
-    typer.echo("; ".join(["magbend: stopped by Ctrl-C", *notes]), err=True)
+    say("; ".join(["magbend: stopped by Ctrl-C", *notes]), err=True)
 
 
 def _stop(error: Exception, sentence: str) -> None:
     if os.environ.get("MAGBEND_DEBUG"):
         raise error
-    typer.echo(printable(f"magbend: {' '.join(sentence.split())}"), err=True)
+    say(f"magbend: {' '.join(sentence.split())}", err=True)
     sys.exit(1)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from .console import print_json
+from .console import print_json, say
 
 EXAMPLE = "Example: magbend migrate runs/gmc2"
 
@@ -26,6 +26,6 @@ def migrate(
     if as_json:
         print_json({"run": str(run), "rewritten": names})
     elif names:
-        typer.echo(f"{run}: migrated; written anew: {', '.join(names)}")
+        say(f"{run}: migrated; written anew: {', '.join(names)}")
     else:
-        typer.echo(f"{run}: is of the present format already")
+        say(f"{run}: is of the present format already")

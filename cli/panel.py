@@ -9,6 +9,7 @@ from pathlib import Path
 import typer
 
 from ..core.errors import MissingExtraError
+from .console import say
 
 EXAMPLE = "Example: magbend panel --rig rig.toml"
 
@@ -62,7 +63,7 @@ def open_panel(
         shown = Panel(Workspace(rig), twin=Twin(seed=seed, speed=speed))
         _warm()
         with contextlib.suppress(KeyboardInterrupt):
-            serve(shown, address, browser=browser, tell=typer.echo)
+            serve(shown, address, browser=browser, tell=say)
 
 
 def open_demo(out: Path, *, seed: int, port: int, browser: bool) -> None:
@@ -72,7 +73,7 @@ def open_demo(out: Path, *, seed: int, port: int, browser: bool) -> None:
 
         _warm()
         rig = prepare_demo(out, seed=seed)
-    typer.echo(f"{rig.parent}: a computed bench; home it, go to a gap, start the run")
+    say(f"{rig.parent}: a computed bench; home it, go to a gap, start the run")
     open_panel(rig, port=port, browser=browser, seed=seed, speed=3.0)
 
 
@@ -80,7 +81,7 @@ def _warm() -> None:
     """Compile the kernels first: while they compile, a page would wait for its stop."""
     from ..analysis import main
 
-    main(lambda text: typer.echo(text.rstrip(), err=True))
+    main(lambda text: say(text.rstrip(), err=True))
 
 
 @contextlib.contextmanager

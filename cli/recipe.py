@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from .console import JSON, group, print_json
+from .console import JSON, group, print_json, say
 from .run_options import RUNS, UNVERIFIED, loaded_runs, outputs, tell_left_out
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def fit(
         print_json(_as_dict(law))
     else:
         _print(law)
-        typer.echo(str(out))
+        say(str(out))
     tell_left_out(left_out, len(loaded))
 
 
@@ -62,14 +62,12 @@ def predict(
         print_json(found.as_dict())
         return
     low, high = found.E_interval_MPa
-    typer.echo(f"E          {found.E_MPa:.3g} MPa (95 %: {low:.3g} to {high:.3g})")
+    say(f"E          {found.E_MPa:.3g} MPa (95 %: {low:.3g} to {high:.3g})")
     low, high = found.remanence_interval_mT
-    typer.echo(
-        f"remanence  {found.remanence_mT:.3g} mT (95 %: {low:.3g} to {high:.3g})"
-    )
-    typer.echo(f"density    {found.density_kg_m3:.0f} kg/m3 without voids")
+    say(f"remanence  {found.remanence_mT:.3g} mT (95 %: {low:.3g} to {high:.3g})")
+    say(f"density    {found.density_kg_m3:.0f} kg/m3 without voids")
     if not found.inside:
-        typer.echo(
+        say(
             "this mixture lies outside those that were fitted: the law is stretched",
             err=True,
         )
@@ -82,10 +80,10 @@ def _as_dict(law: Law) -> dict[str, object]:
 
 
 def _print(law: Law) -> None:
-    typer.echo(f"{len(law.rods)} rods: {', '.join(law.rods)}")
+    say(f"{len(law.rods)} rods: {', '.join(law.rods)}")
     for name, value in (
         ("moduli, rod to rod", law.rod_scatter),
         ("moduli, section to section", law.section_scatter),
         ("remanence, rod to rod", law.remanence_scatter),
     ):
-        typer.echo(f"  scatter of {name}: {100.0 * value:.1f} %")
+        say(f"  scatter of {name}: {100.0 * value:.1f} %")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import print_json
+from .console import print_json, say
 
 if TYPE_CHECKING:
     from ..rig import StageConfig
@@ -35,12 +35,12 @@ def stop(rig: RigOption = RIG, port: PortOption = None) -> None:
     """
     from ..rig import SystemClock, stop_from_outside
 
-    typer.echo(stop_from_outside(rig, stage_table(rig, port), SystemClock()))
+    say(stop_from_outside(rig, stage_table(rig, port), SystemClock()))
 
 
 def pause(rig: RigOption = RIG, port: PortOption = None) -> None:
     """Pause the run that holds the bench, at its next safe point."""
-    typer.echo(_ask(rig, port, "pause"))
+    say(_ask(rig, port, "pause"))
 
 
 def resume(rig: RigOption = RIG, port: PortOption = None) -> None:
@@ -48,7 +48,7 @@ def resume(rig: RigOption = RIG, port: PortOption = None) -> None:
 
     To go on with a run that ended, see magbend rig run --resume.
     """
-    typer.echo(_ask(rig, port, "resume"))
+    say(_ask(rig, port, "resume"))
 
 
 def watch(
@@ -68,7 +68,7 @@ def watch(
                 continue
             line = owner_line(facts)
             if line != before:
-                typer.echo(line)
+                say(line)
             before = line
 
 

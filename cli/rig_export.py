@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from ..core.errors import InputError, StoreError
+from .console import say
 
 EXAMPLE = "Example: magbend rig export runs/gmc2 --to nexus --out gmc2.nxs"
 
@@ -42,4 +43,4 @@ def export(
     except OSError as error:
         raise StoreError(f"{out}: cannot be written: {error.strerror}") from None
     what = "documents" if to == "bluesky" else "photographs"
-    typer.echo(f"{out}: {count} {what}")
+    say(f"{out}: {count} {what}")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..core.errors import ConfigError, InputError
-from .console import print_json
+from .console import print_json, say
 from .keys import answering
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def asker(plan: Plan) -> Callable[[float], float | None]:
             return None
         doubt = witness.judge(gap_mm, flux_mT, None, earlier).sentence
         if doubt:
-            typer.echo(f"{doubt}; type it again to keep it", err=True)
+            say(f"{doubt}; type it again to keep it", err=True)
             flux_mT = ask_flux(gap_mm)
         if flux_mT is not None:
             earlier.append((gap_mm, flux_mT))
@@ -70,7 +70,7 @@ def ask_flux(gap_mm: float) -> float | None:
         value = _millitesla(text)
         if math.isfinite(value):
             return value
-        typer.echo(f"a reading must be a number in mT; instead received {text!r}")
+        say(f"a reading must be a number in mT; instead received {text!r}")
 
 
 def _millitesla(text: str) -> float:
@@ -128,9 +128,9 @@ def amend(
         return
     was = record["was_mT"]
     before = "no reading" if was is None else f"{was:g} mT"
-    typer.echo(f"{run}: step {step} was {before} and is {flux_mT:g} mT")
+    say(f"{run}: step {step} was {before} and is {flux_mT:g} mT")
     if record["field"]["sentence"]:
-        typer.echo(f"note: {record['field']['sentence']}", err=True)
+        say(f"note: {record['field']['sentence']}", err=True)
 
 
 def _witness_of_run(run: Path) -> FieldWitness:

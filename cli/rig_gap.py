@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from ..core.errors import InputError
+from .console import say
 from .keys import answering
 from .rig_ask import RIG, PortOption, RigOption, stage_table
 from .rig_stage import LogOption, connected, facts, line
@@ -67,10 +68,10 @@ def set_gap(
         zero_mm = stage.assume_gap(gap_mm, direction=sign)
         tested = is_tested or _was_tested(before)
         keep_measured_gap(rig, stage, gap_mm, direction_tested=tested)
-        typer.echo(f"{rig}: gap_at_zero_mm = {zero_mm:.3f}, direction = {sign}")
+        say(f"{rig}: gap_at_zero_mm = {zero_mm:.3f}, direction = {sign}")
         if not tested:
-            typer.echo("note: the direction was never tested; run it in a terminal")
-        typer.echo(line(facts(stage)))
+            say("note: the direction was never tested; run it in a terminal")
+        say(line(facts(stage)))
 
 
 def _was_tested(table: Any) -> bool:
@@ -94,7 +95,7 @@ def _test_direction(stage: GapStage, gap_mm: float) -> tuple[Literal[1, -1], flo
     from ..rig import InterlockError
 
     with answering():
-        typer.echo(
+        say(
             "The stage now moves by 1 mm, slowly, and back: see which way it goes.",
             err=True,
         )

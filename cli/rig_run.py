@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..core.errors import InputError, StoreError
-from ..core.text import printable
-from .console import print_json, progress
+from .console import print_json, progress, say
 from .rig_bench import asks_flux, needs_twin, open_bench
 from .rig_flux import require_plausible
 from .rig_show import print_dry_run, print_scan, print_summary
@@ -142,11 +141,11 @@ def verify(
         )
     else:
         for problem in check.problems:
-            typer.echo(printable(problem))
+            say(problem)
         for warning in record.warnings if record else ():
-            typer.echo(printable(f"{run}: {warning}"), err=True)
+            say(f"{run}: {warning}", err=True)
         if record and not check.problems:
-            typer.echo(
+            say(
                 f"{run}: good, {len(record.steps)} steps, {record.status}, "
                 f"{len(check.files)} files"
             )
@@ -208,7 +207,7 @@ def init(
     from ..rig import write_templates
 
     for path in write_templates(folder, twin=twin):
-        typer.echo(str(path))
+        say(str(path))
 
 
 def _report(line: str) -> None:

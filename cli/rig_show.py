@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from ..core.errors import RigError
-from .console import print_json
+from .console import print_json, say
 
 if TYPE_CHECKING:
     from ..rig import FieldScan, Plan, RunSummary
@@ -57,19 +55,17 @@ def print_dry_run(plan: Plan, as_json: bool) -> None:
             }
         )
         return
-    typer.echo(f"{plan.model.name}: {plan.specimen.name} on {plan.rig.name}")
-    typer.echo(
-        "step kind         gap mm  stage mm  move mm   time s  flux mT  tip x, y mm"
-    )
+    say(f"{plan.model.name}: {plan.specimen.name} on {plan.rig.name}")
+    say("step kind         gap mm  stage mm  move mm   time s  flux mT  tip x, y mm")
     for row in rows:
-        typer.echo(_dry_line(row))
+        say(_dry_line(row))
     if plan.rig.magnet is not None:
-        typer.echo(_weight(plan))
+        say(_weight(plan))
     if plan.rig.stage.gap_at_zero_mm is None:
         from ..rig import NEVER_MEASURED
 
-        typer.echo(f"note: {NEVER_MEASURED}")
-    typer.echo(
+        say(f"note: {NEVER_MEASURED}")
+    say(
         f"about {total_s / 60.0:.0f} min with homing; every gap is inside the limits; "
         f"nothing was moved"
     )
@@ -124,9 +120,9 @@ def print_summary(summary: RunSummary, as_json: bool) -> None:
         )
         return
     if summary.status == "success":
-        typer.echo(str(summary.path))
+        say(str(summary.path))
         return
-    typer.echo(
+    say(
         f"magbend: {summary.status}: {' '.join(summary.reason.split())} "
         f"({summary.steps_done} of {summary.steps_total} steps are recorded in "
         f"{summary.path}; go on with --resume --out {summary.path})",
@@ -156,7 +152,7 @@ def print_scan(
     if as_json:
         print_json(data)
     else:
-        typer.echo("\n".join(lines))
+        say("\n".join(lines))
     if not found.gaps_mm:
         raise RigError(
             "not one gap has a reading; check the range of the meter and its port"

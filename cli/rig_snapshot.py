@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from ..core.errors import ConfigError, StoreError
-from .console import print_json
+from .console import print_json, say
 from .keys import terminating
 from .rig_ask import RIG, JsonOption, RigOption
 
@@ -51,12 +51,12 @@ def snapshot(
     if as_json:
         print_json(data)
         return
-    typer.echo(
+    say(
         f"{out}: {data['width_px']} x {data['height_px']} pixels, brightness "
         f"{data['brightness']:.2f}, sharpness {data['sharpness']:.4f}"
     )
     for note in [*data["flags"], *data["notes"]]:
-        typer.echo(f"note: {note}", err=True)
+        say(f"note: {note}", err=True)
 
 
 def _take(rig: Path, table: Any, out: Path, frames: int) -> dict[str, Any]:

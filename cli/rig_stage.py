@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import print_json
+from .console import print_json, say
 from .keys import terminating
 from .rig_ask import (
     RIG,
@@ -55,10 +55,10 @@ def ports(as_json: JsonOption = False) -> None:
         print_json([dataclasses.asdict(port) for port in found])
         return
     if not found:
-        typer.echo("no serial ports; is the cable in, and does it carry data?")
+        say("no serial ports; is the cable in, and does it carry data?")
     for port in found:
         serial = f"serial:{port.serial_number}" if port.serial_number else "-"
-        typer.echo(f"{port.device:<20} {port.usb_id or '-':<10} {serial:<24} "
+        say(f"{port.device:<20} {port.usb_id or '-':<10} {serial:<24} "
                    f"{port.description}")  # fmt: skip
 
 
@@ -84,12 +84,12 @@ def status(
         elif as_json:
             print_json(held)
         else:
-            typer.echo(owner_screen(held))
+            say(owner_screen(held))
         return
     with connected("status", rig, port, log) as stage:
         if not watch:
             data = facts(stage)
-            print_json(data) if as_json else typer.echo(_screen(data))
+            print_json(data) if as_json else say(_screen(data))
             return
         with contextlib.suppress(KeyboardInterrupt):
             while True:
@@ -97,7 +97,7 @@ def status(
                 if as_json:
                     print_json(data)
                 else:
-                    typer.echo(line(data))
+                    say(line(data))
                 if stage.stop_requested():
                     stage.hold()
                 time.sleep(0.5)
@@ -109,10 +109,10 @@ def home(rig: RigOption = RIG, port: PortOption = None, log: LogOption = None) -
     A stock build homes Z first, then X and Y; Ctrl-C stops it at once.
     """
     with connected("home", rig, port, log) as stage:
-        typer.echo("homing; Ctrl-C stops it at once", err=True)
+        say("homing; Ctrl-C stops it at once", err=True)
         with _told_how_to_go_on(stage):
             stage.home()
-        typer.echo(line(facts(stage)))
+        say(line(facts(stage)))
 
 
 def goto(
@@ -140,13 +140,13 @@ def goto(
             stage.check_feed(feed_mm_min)
         with _told_how_to_go_on(stage):
             if home_first and stage.position_state != "homed":
-                typer.echo("homing; Ctrl-C stops it at once", err=True)
+                say("homing; Ctrl-C stops it at once", err=True)
                 stage.home()
             record = stage.goto_gap(gap_mm, feed_mm_min=feed_mm_min, moved=_ticker())
         if as_json:
             print_json(dataclasses.asdict(record))
         else:
-            typer.echo(
+            say(
                 f"gap {record.gap_mm:.3f} mm (machine {record.stage_mm:.3f} mm), "
                 f"{record.duration_s:.1f} s, approached from the {record.approach}"
             )
@@ -176,16 +176,16 @@ def unlock(
     with connected("unlock", rig, port, log) as stage:
         before = stage.status()
         if before.state != "alarm":
-            typer.echo(f"the stage is not locked; it is {before.state}")
+            say(f"the stage is not locked; it is {before.state}")
             return
         sure = yes or typer.confirm(
             "The stage may not know where it is. Homing is safer. Unlock all the same?"
         )
         if not sure:
-            typer.echo("still locked")
+            say("still locked")
             return
         stage.unlock(confirm=True)
-        typer.echo(line(facts(stage)))
+        say(line(facts(stage)))
 
 
 def twin(
@@ -207,7 +207,7 @@ def twin(
 
     played = load_board(state, board)
     with PtyBoard(played, SystemClock()) as served:
-        typer.echo(served.port)
+        say(served.port)
         with contextlib.suppress(KeyboardInterrupt), terminating():
             while True:
                 time.sleep(3600.0)

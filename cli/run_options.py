@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from .console import say
+
 if TYPE_CHECKING:
     from ..analysis import RunData
     from ..sim import Support
@@ -35,17 +37,17 @@ def loaded_runs(
     loaded, left_out = load_runs(paths, unverified=unverified)
     for run in loaded:
         for warning in run.warnings:
-            typer.echo(f"{run.label}: {warning}", err=True)
+            say(f"{run.label}: {warning}", err=True)
     return loaded, left_out
 
 
 def tell_left_out(left_out: Sequence[str], kept: int) -> None:
     """Say what was left out, and how much of how many."""
     for sentence in left_out:
-        typer.echo(f"left out: {sentence}", err=True)
+        say(f"left out: {sentence}", err=True)
     if left_out:
         runs = len(left_out) + kept
-        typer.echo(f"{len(left_out)} of {runs} runs left out", err=True)
+        say(f"{len(left_out)} of {runs} runs left out", err=True)
 
 
 def outputs(*paths: Path | None) -> None:

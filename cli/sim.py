@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from . import sim_equilibria, sim_magnet, sim_navigate, sim_path, sim_steer, sim_sweep
-from .console import group, print_json
+from .console import group, print_json, say
 from .sim_case import field_of, rod_of
 
 if TYPE_CHECKING:
@@ -190,40 +190,36 @@ def _write(solution: Solution, rod: Specimen, out: Path) -> None:
 
 def _print_ending(end: dict[str, Any]) -> None:
     x, y = end["place_mm"]
-    typer.echo(f"  ends at      {end['load']:.5g} of the load")
+    say(f"  ends at      {end['load']:.5g} of the load")
     if end["kind"] == "contact":
-        typer.echo(f"  by contact   at ({x:.3f}, {y:.3f}) mm, s = {end['s_mm']:.3f} mm")
+        say(f"  by contact   at ({x:.3f}, {y:.3f}) mm, s = {end['s_mm']:.3f} mm")
     else:
         dx, dy = end["turning"]
-        typer.echo(
-            f"  in a fold    tip ({x:.3f}, {y:.3f}) mm, going ({dx:.2f}, {dy:.2f})"
-        )
+        say(f"  in a fold    tip ({x:.3f}, {y:.3f}) mm, going ({dx:.2f}, {dy:.2f})")
 
 
 def _print(data: dict[str, Any]) -> None:
-    typer.echo(f"{data['specimen']}, model {data['model']}: {data['status']}")
+    say(f"{data['specimen']}, model {data['model']}: {data['status']}")
     if "tip_mm" in data:
         x, y = (round(value, 5) + 0.0 for value in data["tip_mm"])
-        typer.echo(f"  tip          ({x:.5f}, {y:.5f}) mm")
-        typer.echo(f"  tip angle    {data['tip_angle_deg']:.5f} deg")
-        typer.echo(f"  root moment  {data['root_moment_Nm']:.6g} N m")
-        typer.echo(f"  Morse index  {data['morse_index']}")
+        say(f"  tip          ({x:.5f}, {y:.5f}) mm")
+        say(f"  tip angle    {data['tip_angle_deg']:.5f} deg")
+        say(f"  root moment  {data['root_moment_Nm']:.6g} N m")
+        say(f"  Morse index  {data['morse_index']}")
         if data["sag_mm"] != 0.0:
-            typer.echo(f"  sag          {data['sag_mm']:.5f} mm below the clamp")
+            say(f"  sag          {data['sag_mm']:.5f} mm below the clamp")
         for x, y in data.get("buckled_tips_mm", ()):
-            typer.echo(
-                f"  buckles to   a stable shape with its tip at ({x:.5f}, {y:.5f}) mm"
-            )
+            say(f"  buckles to   a stable shape with its tip at ({x:.5f}, {y:.5f}) mm")
         if data["status"] == "stable" and data["stable_in_space"] is False:
-            typer.echo("  in space     unstable: left free, it swings out of the plane")
-        typer.echo(f"  error        below {data['error_mm']:.1e} mm")
+            say("  in space     unstable: left free, it swings out of the plane")
+        say(f"  error        below {data['error_mm']:.1e} mm")
     elif "ending" in data:
         _print_ending(data["ending"])
     elif data["load_limit"] < 1.0:
-        typer.echo(f"  branch ends  at {data['load_limit']:.4g} of the load")
+        say(f"  branch ends  at {data['load_limit']:.4g} of the load")
     else:
-        typer.echo("  touches the magnet at full load")
+        say("  touches the magnet at full load")
     bx, by = (round(value, 4) + 0.0 for value in data["flux_tip_mT"])
-    typer.echo(f"  flux at tip  ({bx:.4f}, {by:.4f}) mT")
+    say(f"  flux at tip  ({bx:.4f}, {by:.4f}) mT")
     if "check_mm" in data:
-        typer.echo(f"  check        least energy agrees to {data['check_mm']:.1e} mm")
+        say(f"  check        least energy agrees to {data['check_mm']:.1e} mm")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import print_json
+from .console import print_json, say
 from .sim_case import field_of, rod_of
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def equilibria(
     if fold:
         _print_folds(folds, field_mT or 0.0)
     if figure is not None:
-        typer.echo(f"wrote {figure}")
+        say(f"wrote {figure}")
 
 
 def _data(
@@ -132,11 +132,11 @@ def _data(
 
 def _print(case: str, found: tuple[Equilibrium, ...]) -> None:
     count = "1 equilibrium" if len(found) == 1 else f"{len(found)} equilibria"
-    typer.echo(f"{case}: {count}")
-    typer.echo("  tip angle deg       tip x mm     tip y mm  Morse index")
+    say(f"{case}: {count}")
+    say("  tip angle deg       tip x mm     tip y mm  Morse index")
     for one in found:
         x, y = one.tip_mm
-        typer.echo(
+        say(
             f"  {one.theta_tip_rad * 57.29577951308232:13.5f}  {x:13.5f}{y:13.5f}"
             f"  {one.morse_index} ({one.status})"
         )
@@ -144,14 +144,14 @@ def _print(case: str, found: tuple[Equilibrium, ...]) -> None:
 
 def _print_folds(folds: list[Fold], field_mT: float) -> None:
     if not folds:
-        typer.echo(f"  no fold up to {field_mT:g} mT")
+        say(f"  no fold up to {field_mT:g} mT")
     for one in folds:
         what = (
             "a pair begins or ends"
             if one.kind == "fold"
             else "a pair leaves the straight rod"
         )
-        typer.echo(
+        say(
             f"  {one.kind} at {one.flux_mT:.8g} mT, tip angle "
             f"{one.theta_tip_rad * 57.29577951308232:.5f} deg: {what}"
         )

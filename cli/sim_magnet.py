@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import print_json
+from .console import print_json, say
 
 if TYPE_CHECKING:
     from ..sim import MagnetFit
@@ -85,9 +85,9 @@ def _plain(fit: MagnetFit) -> dict[str, Any]:
 
 
 def _print(fit: MagnetFit, printed: list[dict[str, float]]) -> None:
-    typer.echo("gap_mm  flux_mT  remanence_T  predicted_mT  residual_%  verdict")
+    say("gap_mm  flux_mT  remanence_T  predicted_mT  residual_%  verdict")
     for reading in fit.readings:
-        typer.echo(
+        say(
             f"{reading.gap_mm:6.2f}  {reading.flux_mT:7.2f}  "
             f"{reading.remanence_T:11.4f}  "
             f"{reading.predicted_mT:12.2f}  {reading.residual_percent:+10.1f}  "
@@ -101,22 +101,22 @@ def _print(fit: MagnetFit, printed: list[dict[str, float]]) -> None:
         low_T, high_T = fit.remanence_95_T
         chi2 = f", 95 % from {low_T:.4f} to {high_T:.4f} T "
         chi2 += f"(reduced chi2 {fit.chi2_reduced:.3g})"
-    typer.echo(f"one remanence for all: {fit.remanence_T:.4f}{spread} T{chi2}")
+    say(f"one remanence for all: {fit.remanence_T:.4f}{spread} T{chi2}")
     if fit.birge_ratio > 1.0:
-        typer.echo(
+        say(
             f"the readings scatter {fit.birge_ratio:.2g} times as much as their sd_mT "
             "says: the uncertainty is widened by that (Birge ratio)"
         )
     if fit.offset_sd_mm:
-        typer.echo(f"probe offset: {fit.offset_mm:.2f} +- {fit.offset_sd_mm:.2f} mm")
+        say(f"probe offset: {fit.offset_mm:.2f} +- {fit.offset_sd_mm:.2f} mm")
     if abs(fit.remanence_T) > STRONGEST_T:
-        typer.echo(
+        say(
             f"{fit.remanence_T:.2f} T is more than any NdFeB magnet has "
             f"({STRONGEST_T:g} T): the readings, the gaps or the sides are wrong"
         )
     for reading, row in zip(fit.readings, printed, strict=False):
         agrees = round(row["remanence_T"], 4) == row["printed_T"]
-        typer.echo(
+        say(
             f"paper at {reading.gap_mm:g} mm: prints {row['printed_T']:.4f} T, "
             + (
                 "which its reading gives"

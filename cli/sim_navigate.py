@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import print_json
+from .console import print_json, say
 from .sim_case import field_of, rod_of
 
 if TYPE_CHECKING:
@@ -179,27 +179,23 @@ def write_passage(folder: Path, lumen: Lumen, passage: Passage, rod: Specimen) -
     side_mm = max(rod.sides_mm)
     draw_passage(folder / "passage.png", lumen, passage, side_mm=side_mm)
     film(folder / "passage.gif", lumen, passage, side_mm=side_mm)
-    typer.echo(f"wrote {folder}", err=True)
+    say(f"wrote {folder}", err=True)
 
 
 def _print(data: dict[str, Any], passage: Passage) -> None:
-    typer.echo(f"{data['specimen']} in {data['lumen']}: {data['outcome']}")
-    typer.echo(f"  reached         {data['reached_mm']:.3f} mm")
-    typer.echo(f"  gates           {', '.join(data['gates']) or 'none'}")
+    say(f"{data['specimen']} in {data['lumen']}: {data['outcome']}")
+    say(f"  reached         {data['reached_mm']:.3f} mm")
+    say(f"  gates           {', '.join(data['gates']) or 'none'}")
     x, y = data["tip_mm"]
-    typer.echo(
-        f"  tip             ({x:.4f}, {y:.4f}) mm, {data['tip_angle_deg']:.3f} deg"
-    )
-    typer.echo(f"  greatest push   {1e3 * data['most_push_N']:.4g} mN")
-    typer.echo(f"  root curvature  {data['most_root_curvature_per_mm']:.4g} 1/mm")
-    typer.echo(f"  on the walls    {1e3 * data['most_wall_N']:.4g} mN")
+    say(f"  tip             ({x:.4f}, {y:.4f}) mm, {data['tip_angle_deg']:.3f} deg")
+    say(f"  greatest push   {1e3 * data['most_push_N']:.4g} mN")
+    say(f"  root curvature  {data['most_root_curvature_per_mm']:.4g} 1/mm")
+    say(f"  on the walls    {1e3 * data['most_wall_N']:.4g} mN")
     for event in passage.snaps:
-        typer.echo(
+        say(
             f"  snap            at {event.insertion_mm:.3f} mm: the rod moves "
             f"{event.moved_mm:.2f} mm and loses {event.released_Nmm:.3g} N mm"
         )
-    typer.echo(
-        f"  overlap         {data['overlap_mm']:.1e} mm at most, between contacts"
-    )
+    say(f"  overlap         {data['overlap_mm']:.1e} mm at most, between contacts")
     if data["error_mm"] == data["error_mm"]:
-        typer.echo(f"  error           {data['error_mm']:.1e} mm, of the last shape")
+        say(f"  error           {data['error_mm']:.1e} mm, of the last shape")

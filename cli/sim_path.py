@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from .console import print_json
+from .console import print_json, say
 from .sim_case import field_of, rod_of
 
 if TYPE_CHECKING:
@@ -177,20 +177,20 @@ def _data(name: str, found: Followed) -> dict[str, Any]:
 
 def _print(name: str, found: Followed, files: list[Path | None]) -> None:
     quantity, unit = found.quantity.rsplit("_", 1)
-    typer.echo(f"{name}: {len(found.points)} points of {found.quantity}")
+    say(f"{name}: {len(found.points)} points of {found.quantity}")
     for one in found.folds:
         x, y = one.tip_mm
-        typer.echo(
+        say(
             f"  {one.kind:8} at {one.value:.6g} {unit}, {quantity} {one.direction}, "
             f"tip ({x:.4f}, {y:.4f}) mm"
         )
     lost = sum(one.centreline is None for one in found.points)
     if not found.folds and not lost:
-        typer.echo("  no fold: the rod goes back the way it came")
+        say("  no fold: the rod goes back the way it came")
     if lost:
-        typer.echo(f"  pulled in at {lost} points")
+        say(f"  pulled in at {lost} points")
     if found.dissipated_uJ > 0.0:
-        typer.echo(f"  snaps dissipate {found.dissipated_uJ:.4g} microjoules")
+        say(f"  snaps dissipate {found.dissipated_uJ:.4g} microjoules")
     for file in files:
         if file is not None:
-            typer.echo(f"wrote {file}")
+            say(f"wrote {file}")

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from .console import print_json
+from .console import print_json, say
 from .sim_case import rod_of
 from .sim_navigate import write_passage
 
@@ -113,12 +113,12 @@ def _means(
 
 
 def _print(steered: Any, rod: str, gate: str) -> None:
-    typer.echo(f"{rod} passes {gate!r}:")
+    say(f"{rod} passes {gate!r}:")
     for pose in steered.poses:
         rest = ", ".join(
             f"{name} {value:g}"
             for name, value in pose.items()
             if name != "insertion_mm"
         )
-        typer.echo(f"  {pose['insertion_mm']:6.2f} mm in: {rest}")
-    typer.echo(f"  on the walls  {1e3 * steered.passage.most('wall_N'):.4g} mN at most")
+        say(f"  {pose['insertion_mm']:6.2f} mm in: {rest}")
+    say(f"  on the walls  {1e3 * steered.passage.most('wall_N'):.4g} mN at most")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .console import print_json, progress
+from .console import print_json, progress, say
 
 EXAMPLE = "Example: magbend sim sweep field angle --gmc 2 --out studies"
 NAMES = ("field", "angle", "stiffness", "length", "side")
@@ -91,8 +91,8 @@ def sweep(
         where = ""
         if isinstance(tip, tuple):
             where = f"tip ({tip[0]:8.4f}, {tip[1]:8.4f}) mm"
-        typer.echo(
+        say(
             f"{row['study']:10s} {row['value']:>10s} {row['unit']:8s} {where}  "
             f"{row['status']}"
         )
-    typer.echo(f"wrote {', '.join(f'{name}.svg/.pdf/.csv' for name in names)} in {out}")
+    say(f"wrote {', '.join(f'{name}.svg/.pdf/.csv' for name in names)} in {out}")

@@ -7,7 +7,7 @@ from pathlib import Path
 import typer
 
 from .analysis_import import ALIGN, FLIP, UNIT
-from .console import JSON, group, print_json, progress
+from .console import JSON, group, print_json, progress, say
 
 app = group(
     "surrogate",
@@ -76,9 +76,9 @@ def predict(
         print_json(answer)
         return
     x, y = line.tip_mm
-    typer.echo(f"tip ({x:.5f}, {y:.5f}) mm, {line.tip_angle_deg:.4f} deg")
+    say(f"tip ({x:.5f}, {y:.5f}) mm, {line.tip_angle_deg:.4f} deg")
     bound = "no left-out case was" if correction else "in 95 % no point is"
-    typer.echo(f"{bound} off by more than {error_mm:.2g} mm")
+    say(f"{bound} off by more than {error_mm:.2g} mm")
 
 
 _COLUMNS = ("s_mm", "x_mm", "y_mm", "theta_rad", "kappa_per_mm")
@@ -103,7 +103,7 @@ def fit(
         print_json(model.card)
         return
     card = model.card
-    typer.echo(
+    say(
         f"on unseen designs: {card['rms_mm']:.2g} mm RMS, worst tip "
         f"{card['worst_tip_mm']:.2g} mm"
     )
@@ -153,7 +153,7 @@ def correct(
             }
         )
         return
-    typer.echo(
+    say(
         f"{learnt.cases} cases: the rod alone is off by up to "
         f"{learnt.rod_error_mm:.2g} mm, corrected (each case left out in turn) by up "
         f"to {learnt.error_mm:.2g} mm"
@@ -175,11 +175,11 @@ def compare(
     if as_json:
         print_json([asdict(row) for row in rows])
         return
-    typer.echo(f"{'':22s}  RMS mm      worst tip mm  time us   size kB")
+    say(f"{'':22s}  RMS mm      worst tip mm  time us   size kB")
     for row in rows:
         cells = (row.rms_mm, row.worst_tip_mm, row.time_us, row.size_kB)
         text = "  ".join(f"{'-' if v != v else format(v, '.2g'):>10s}" for v in cells)
-        typer.echo(f"{row.name:22s}{text}")
+        say(f"{row.name:22s}{text}")
 
 
 def sensitivity(
@@ -218,8 +218,8 @@ def sensitivity(
         print_json(rows)
         return
     for i, flux in enumerate(found.fields_mT):
-        typer.echo(f"{flux:g} mT, total order (share of the variance):")
-        typer.echo(" " * 17 + "".join(f"{name:>15s}" for name in sobol.OUTPUTS))
+        say(f"{flux:g} mT, total order (share of the variance):")
+        say(" " * 17 + "".join(f"{name:>15s}" for name in sobol.OUTPUTS))
         for k, parameter in enumerate(sobol.PARAMETERS):
             cells = "".join(f"{value:15.3f}" for value in found.total[i, :, k])
-            typer.echo(f"{parameter:17s}{cells}")
+            say(f"{parameter:17s}{cells}")

@@ -12,7 +12,7 @@ import typer
 
 from ..core.errors import InputError
 from . import vision_points
-from .console import JSON, group, print_json, progress
+from .console import JSON, group, print_json, progress, say
 from .vision_show import (
     calibration_facts,
     tell_calibration,
@@ -65,7 +65,7 @@ def board(
     )
     write_board(design, out, dpi=dpi)
     width, height = design.size_mm
-    typer.echo(
+    say(
         f"{out}: {design.describe().split(', printed')[0]}; {width:g} x {height:g} mm. "
         "Print at 100 %, then measure it with a calliper for --print-scale."
     )

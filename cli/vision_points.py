@@ -8,7 +8,7 @@ from pathlib import Path
 import typer
 
 from ..core.errors import InputError, VisionError
-from .console import JSON, print_json
+from .console import JSON, print_json, say
 
 
 def register(app: typer.Typer) -> None:
@@ -94,7 +94,7 @@ def points(
         if found.length_mm == found.length_mm
         else f"{found.length_px:.1f} px long (no ruler, no calibration)"
     )
-    typer.echo(f"{photo.name}: {size}; {', '.join(found.flags)}; in {out}")
+    say(f"{photo.name}: {size}; {', '.join(found.flags)}; in {out}")
 
 
 def _points(text: str, option: str, count: int | None) -> list[tuple[float, float]]:

@@ -7,9 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
-from .console import print_json
+from .console import print_json, say
 
 if TYPE_CHECKING:
     from ..vision import BatchResult, Calibration, FrameRow, Ringing
@@ -45,25 +43,23 @@ def tell_calibration(result: Calibration, facts: dict[str, Any], out: Path) -> N
     """Print a calibration for people."""
     for view in result.views:
         verdict = "used" if view.used else f"dropped: {view.why_not}"
-        typer.echo(
-            f"{view.name}: {view.corners} corners, RMS {view.rms_px:.3f} px, {verdict}"
-        )
-    typer.echo(f"scale {facts['mm_per_px']:.7f} mm/px, tilt {result.tilt_deg:.2f} deg")
+        say(f"{view.name}: {view.corners} corners, RMS {view.rms_px:.3f} px, {verdict}")
+    say(f"scale {facts['mm_per_px']:.7f} mm/px, tilt {result.tilt_deg:.2f} deg")
     if math.isfinite(result.camera_height_sd_mm):
         height, sd = result.camera_height_mm, result.camera_height_sd_mm
-        typer.echo(
+        say(
             f"camera {height:.0f} +- {sd:.0f} mm above the plane "
             f"({result.camera_height_source}); per mm of height the scale shrinks by "
             f"{100.0 / height:.3f} +- {100.0 * sd / height**2:.3f} %"
         )
         if sd > 0.3 * height:
-            typer.echo(
+            say(
                 "The camera's height is hardly known. If the rod lies above the "
                 "board's plane, give --camera-height-mm or add tilted photographs."
             )
     else:
-        typer.echo(f"camera height {result.camera_height_source}")
-    typer.echo(f"{out}: written")
+        say(f"camera height {result.camera_height_source}")
+    say(f"{out}: written")
 
 
 _TOLD_ONCE = ("uncalibrated", "clamp_moved", "height_assumed")
@@ -75,13 +71,13 @@ def _tell_clamps(frames: Sequence[FrameRow]) -> None:
     for run, sd_deg in shared.items():
         if run:
             count = sum(frame.shared_clamp == run for frame in frames)
-            typer.echo(
+            say(
                 f"{run}: {count} photographs share one clamp, its direction is known "
                 f"to {sd_deg:.2f} deg"
             )
     moved = sum("clamp_moved" in frame.flags for frame in frames)
     if moved:
-        typer.echo(
+        say(
             f"clamp_moved: {moved} photographs of one clamp disagree on its place or "
             "direction; each keeps its own",
             err=True,
@@ -120,25 +116,23 @@ def tell_frames(result: BatchResult, *, json_output: bool) -> None:
         return
     for frame in result.frames:
         if not frame.ok:
-            typer.echo(f"{frame.image}: failed: {frame.reason}", err=True)
+            say(f"{frame.image}: failed: {frame.reason}", err=True)
         elif doubts := [f for f in frame.flags if f not in _TOLD_ONCE]:
-            typer.echo(f"{frame.image}: {', '.join(doubts)}", err=True)
+            say(f"{frame.image}: {', '.join(doubts)}", err=True)
     _tell_clamps(result.frames)
     if any("height_assumed" in frame.flags for frame in result.frames):
-        typer.echo(
+        say(
             "height_assumed: nobody said how high the rod's axis lies above the board; "
             "0 mm is taken: give --rod-height-mm (half the rod's side, and what lies "
             "under it), 0 if the board lay at its height",
             err=True,
         )
-    typer.echo(
-        f"{result.out}: {result.measured} of {len(result.frames)} photographs measured"
-    )
+    say(f"{result.out}: {result.measured} of {len(result.frames)} photographs measured")
 
 
 def tell_ringing(found: Ringing, settle_mm: float) -> None:
     """Print a vibration for people."""
-    typer.echo(
+    say(
         f"frequency {found.frequency_Hz:.3f} +- {found.frequency_sd_Hz:.3f} Hz, "
         f"damping ratio {found.damping_ratio:.4f} +- {found.damping_ratio_sd:.4f}"
     )
@@ -147,7 +141,7 @@ def tell_ringing(found: Ringing, settle_mm: float) -> None:
         if math.isfinite(found.settle_s)
         else "it does not die away"
     )
-    typer.echo(
+    say(
         f"amplitude {found.amplitude_mm:.3f} mm at {found.first_s:.3f} s; {settled} "
         f"({found.frames} frames, {found.residual_mm:.3f} mm left)"
     )

@@ -17,6 +17,11 @@ def printable(text: str) -> str:
     return _CONTROL.sub(lambda found: repr(found.group())[1:-1], text)
 
 
+def printable_json(text: str) -> str:
+    """Return a text of JSON without such signs: it still says the same."""
+    return _CONTROL.sub(lambda found: f"\\u{ord(found.group()):04x}", text)
+
+
 def defused(cell: Any) -> Any:
     """Return a cell of a table that no spreadsheet takes for a formula.
 
