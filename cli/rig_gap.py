@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from ..core.checks import finite
 from ..core.errors import InputError
 from .console import say
 from .keys import answering
@@ -37,13 +38,17 @@ def set_gap(
             "Leaves the test out."
         ),
     ] = None,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="Do not ask if it changes the map by > 5 mm.")
+    ] = False,
     log: LogOption = None,
 ) -> None:
     """Tell the measured gap at which the stage stands.
 
     The first time the stage moves by 1 mm and back, and you say which way it went.
     Zero, direction and the settings of the board are written to the rig file; from then
-    on they are compared at every connection.
+    on they are compared at every connection. A gap more than 5 mm from what the map
+    says is taken only if you confirm it, or with --yes.
     """
     from ..rig import keep_measured_gap, read_rig
 
@@ -65,6 +70,7 @@ def set_gap(
             _require_room(gap_mm, read_rig(rig).limits.min_gap_mm)
             sign, gap_mm = _test_direction(stage, gap_mm)
             is_tested = True
+        _confirm(stage, gap_mm, yes)
         zero_mm = stage.assume_gap(gap_mm, direction=sign)
         tested = is_tested or _was_tested(before)
         keep_measured_gap(rig, stage, gap_mm, direction_tested=tested)
@@ -72,6 +78,26 @@ def set_gap(
         if not tested:
             say("note: the direction was never tested; run it in a terminal")
         say(line(facts(stage)))
+
+
+def _confirm(stage: GapStage, gap_mm: float, yes: bool) -> None:
+    """Refuse a gap far from the map's, unless somebody means it."""
+    from ..rig import InterlockError, why_doubt_gap
+
+    finite(gap_mm, "gap_mm", "mm")
+    doubt = why_doubt_gap(stage, gap_mm)
+    if not doubt:
+        return
+    if yes:
+        typer.echo(f"note: {doubt}", err=True)
+        return
+    if sys.stdin.isatty():
+        with answering():
+            if typer.confirm(f"{doubt}. Is {gap_mm:g} mm right?", err=True):
+                return
+    raise InterlockError(
+        f"{doubt}: gauge it again, or confirm it with --yes; nothing was changed"
+    )
 
 
 def _was_tested(table: Any) -> bool:

@@ -22,6 +22,9 @@ from .bench.devices import (
 from .bench.measured import (
     keep_measured_gap as keep_measured_gap,
 )
+from .bench.measured import (
+    why_doubt_gap as why_doubt_gap,
+)
 from .bench.open import (
     open_camera as open_camera,
 )

@@ -55,7 +55,7 @@ def tell_direction(panel: Panel, arguments: Arguments) -> Outcome:
 
 def set_gap(panel: Panel, arguments: Arguments) -> Outcome:
     """Take a gauged gap for where the stage stands, and write it into the rig file."""
-    from ...rig import keep_measured_gap
+    from ...rig import InterlockError, keep_measured_gap, why_doubt_gap
 
     gap_mm = number(arguments, "gap_mm", "mm")
     panel.require_free()
@@ -69,6 +69,11 @@ def set_gap(panel: Panel, arguments: Arguments) -> Outcome:
 
     def assume(parts: Parts) -> float:
         stage = stage_of(parts)
+        doubt = why_doubt_gap(stage, gap_mm)
+        if doubt and arguments.get("confirm") is not True:
+            raise InterlockError(
+                f"{doubt}: gauge it again, or confirm it; nothing was changed"
+            )
         zero_mm: float = stage.assume_gap(gap_mm, direction=panel.direction)
         keep_measured_gap(
             panel.workspace.rig_path, stage, gap_mm, direction_tested=tested

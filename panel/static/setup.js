@@ -123,6 +123,14 @@ function saver(inputs, numbers, step, label = "Write into the rig file") {
   }}, label);
 }
 
+async function setGap(gap) {
+  if (Number.isNaN(gap)) { toast("The gauge is a number of mm.", "bad"); return; }
+  const said = link.state?.bench.facts.gap_mm ?? gap;
+  if (Math.abs(gap - said) <= 5) { doIt("setup-gap", {gap_mm: gap}); return; }
+  const text = `The map said ${num(said, 1)} mm; this changes it by ${num(gap - said, 1)} mm, and the interlock with it. A misread gauge would do the same.`;
+  if (await ask("Is the gauge right?", text, "It is right")) doIt("setup-gap", {gap_mm: gap, confirm: true});
+}
+
 const makers = {
   files() {
     if (known.values.port !== undefined) return [h("p", {}, "The bench's files are there: ", h("code", {}, link.state?.files.folder ?? "")), h("p", {}, "rig.toml says what stands on the bench, specimen.toml what the rod is, plan.toml what is to be done. All have comments; change them here or by hand.")];
@@ -143,7 +151,7 @@ const makers = {
     const gauge = h("input", {type: "text", inputmode: "decimal", size: 8, name: "gauge"});
     return [h("p", {}, "Home the stage, jog until a gauge block just fits between the magnet's N face and the tip of the straight rod (or a straight dummy of its length), and say how long the gauge is."),
       h("div", {class: "row"}, h("button", {type: "button", onclick: async () => { if (await ask("Home the stage?", "It runs to its switch. Stop (Escape) ends it at once.", "Home it")) await act("home", {}, true); }}, "Home"), [-10, -1, -0.1, 0.1, 1, 10].map((step) => h("button", {type: "button", onclick: () => act("jog", {step_mm: step}, true)}, `${step > 0 ? "+" : "−"}${Math.abs(step)}`))),
-      h("p", {class: "big", id: "setup-gap"}), h("div", {class: "row"}, field("The gauge, mm", gauge), h("button", {type: "button", class: "primary", onclick: () => { const gap = typed(gauge.value); Number.isNaN(gap) ? toast("The gauge is a number of mm.", "bad") : doIt("setup-gap", {gap_mm: gap}); }}, "Set the gap")),
+      h("p", {class: "big", id: "setup-gap"}), h("div", {class: "row"}, field("The gauge, mm", gauge), h("button", {type: "button", class: "primary", onclick: () => setGap(typed(gauge.value))}, "Set the gap")),
       h("h3", {}, "Which way does it go?"), h("p", {}, `The first time, let the stage move by 1 mm and back, and say what you saw. ${known.tested ? "That was done." : "That has not been done on this bench."}`),
       h("div", {class: "row"}, h("button", {type: "button", onclick: () => doIt("setup-try-direction")}, "Move by 1 mm"), h("button", {type: "button", onclick: () => doIt("setup-tell-direction", {farther: true})}, "It went farther away"), h("button", {type: "button", onclick: () => doIt("setup-tell-direction", {farther: false})}, "It came nearer"))];
   },

@@ -9,6 +9,24 @@ from ...core.errors import InputError
 from ..stage.gap import GapStage
 from .file_edit import write_measured_gap
 
+_DOUBTFUL_CHANGE_MM = 5.0
+"""By more than this a gauge is more likely misread than the map is wrong."""
+
+
+def why_doubt_gap(stage: GapStage, gap_mm: float) -> str:
+    """Return what the map says otherwise of the gap here; empty if it agrees to 5 mm.
+
+    The interlock moves with the map: a misread gauge moves it by as much. A stage that
+    was never measured, or does not know where it is, has nothing to hold against it.
+    """
+    said_mm = stage.status().gap_mm
+    if said_mm is None or abs(gap_mm - said_mm) <= _DOUBTFUL_CHANGE_MM:
+        return ""
+    return (
+        f"the map said {said_mm:.1f} mm; this changes it by {gap_mm - said_mm:+.1f} "
+        "mm, and the interlock with it"
+    )
+
 
 def keep_measured_gap(
     rig_file: Path, stage: GapStage, gap_mm: float, *, direction_tested: bool = False

@@ -56,6 +56,9 @@ def test_a_gap_is_not_set_before_the_direction_was_seen(
     assert facts["gap_mm"] == pytest.approx(147.0, abs=0.01)
     text = fresh.panel.workspace.rig_path.read_text()
     assert "direction_tested = true" in text
+    refused = fresh.command("setup-gap", gap_mm=70.0)["error"]
+    assert "map said 147.0 mm; this changes it by -77.0 mm" in refused
+    assert fresh.panel.workspace.rig_path.read_text() == text
     assert finish(fresh, "goto", gap_mm=145.0)["ok"]
 
 

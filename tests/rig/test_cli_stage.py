@@ -76,9 +76,22 @@ def test_a_gap_that_leaves_no_gap_is_not_kept(bench_folder):
     rig("home")
     before = (bench_folder / "rig.toml").read_bytes()
     with pytest.raises(MagbendError, match=r"500 mm here.*gauge it again"):
-        rig("set-gap", "500")
+        rig("set-gap", "500", "--yes")
     assert (bench_folder / "rig.toml").read_bytes() == before
     assert "homed" in rig("status")
+
+
+def test_a_misread_gauge_is_held_against_the_map(bench_folder):
+    rig("home")
+    rig("goto", "110")
+    before = (bench_folder / "rig.toml").read_bytes()
+    with pytest.raises(
+        MagbendError, match=r"map said 110.0 mm; this changes it by -40.0 mm.*--yes"
+    ):
+        rig("set-gap", "70")
+    assert (bench_folder / "rig.toml").read_bytes() == before
+    assert json.loads(rig("status", "--json"))["gap_mm"] == pytest.approx(110.0)
+    assert "gap_at_zero_mm = 80.000" in rig("set-gap", "70", "--yes")
 
 
 def test_goto_homes_first_if_told(bench_folder):
