@@ -13,6 +13,7 @@ FOLDERS = {
     "magbend.examples.plans": "plans",
     "magbend.examples.specimens": "specimens",
     "magbend.examples.library": "library",
+    "magbend.examples.lumens": "lumens",
 }
 KINDS = (".py", ".md", ".toml", ".csv", ".ipynb")
 

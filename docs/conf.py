@@ -2,7 +2,8 @@
 
 Pages are Markdown (MyST). What would go stale by hand is made here before each build,
 into ``docs/made/``: the reference of commands from the command line itself, one page
-a face from its docstrings, the gallery from the examples, the drawings.
+a face from its docstrings, the gallery from the examples; and the drawings, into
+``docs/pictures/``, where they are committed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""Drawings of the site: the house, and the bench seen from above and from the side."""
+"""Drawings of the site: the house, and the bench seen from above and from the side.
+
+They lie in ``docs/pictures`` and are committed, so that the pages show them unbuilt;
+``make docs`` draws them anew.
+"""
 
 from __future__ import annotations
 
@@ -30,6 +34,14 @@ FLOORS = (
     ),
     (("core", "errors, units, specimen, centreline, tables, files, kernels"),),
 )
+
+
+def all_drawings(folder: Path) -> list[Path]:
+    """Draw each one into a folder; return the files."""
+    files = [folder / "architecture.svg", folder / "bench.svg"]
+    for file, draw in zip(files, (architecture, bench), strict=True):
+        draw(file)
+    return files
 
 
 def architecture(out: Path) -> None:
@@ -142,5 +154,5 @@ def _from_the_side(axes: Any) -> None:
 
 def _save(figure: Any, out: Path) -> None:
     with mpl.rc_context({"svg.hashsalt": out.name}):
-        figure.savefig(out, metadata={"Date": None}, facecolor="white")
+        figure.savefig(out, metadata={"Date": None, "Creator": None}, facecolor="white")
     plt.close(figure)

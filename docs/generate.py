@@ -28,8 +28,7 @@ def all_pages(out: Path) -> None:
     """Make every page anew."""
     shutil.rmtree(out, ignore_errors=True)
     (out / "api").mkdir(parents=True)
-    drawings.architecture(out / "architecture.svg")
-    drawings.bench(out / "bench.svg")
+    drawings.all_drawings(out.parent / "pictures")
     (out / "commands.md").write_text(commands(), encoding="utf-8")
     told: set[int] = set()
     for face, title in FACES.items():

@@ -50,7 +50,10 @@ def test_an_unknown_kind_is_one_sentence() -> None:
 
 def test_examples_are_copied_once(tmp_path: Path) -> None:
     paths = {path.relative_to(tmp_path / "x") for path in copy_examples(tmp_path / "x")}
-    wanted = {"simulate_a_shape.py", "library/million.toml", "specimens/gmc2.toml"}
+    wanted = {
+        "simulate_a_shape.py", "library/million.toml", "specimens/gmc2.toml",
+        "lumens/bend90.toml", "lumens/fork.toml",
+    }  # fmt: skip
     assert {Path(name) for name in wanted} <= paths
     with pytest.raises(StoreError, match="is there already"):
         copy_examples(tmp_path / "x")
