@@ -51,6 +51,20 @@ def needs_twin(plan: Plan) -> bool:
     return True
 
 
+def connect_computed(plan: Plan, seed: int) -> None:
+    """Connect to the stage of the computed bench, in memory: nothing is moved.
+
+    Raises
+    ------
+    StageError
+        If its board does not fit the rig file: no gap in reach, too fast, ...
+    """
+    from ..analysis import open_twin_bench
+
+    _, devices = open_twin_bench(plan, seed=seed, clock=_clock(seed, None))
+    devices.close()
+
+
 def asks_flux(plan: Plan, readings_mT: dict[float, float] | None) -> bool:
     """Return whether the readings of a hand meter are asked for at each gap."""
     by_hand = plan.rig.meter.driver == "manual" and readings_mT is None

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..core.checks import finite, positive
 from ..core.errors import InputError, StoreError
 from .console import print_json, progress, say
-from .rig_bench import asks_flux, needs_twin, open_bench
+from .rig_bench import asks_flux, connect_computed, needs_twin, open_bench
 from .rig_flux import require_plausible
 from .rig_show import print_dry_run, print_scan, print_summary
 
@@ -94,17 +95,21 @@ def run(
 
     checked = read_plan(plan)
     readings_mT = _readings_mT(flux_mT, checked.gaps_mm)
-    if dry_run:
-        if readings_mT:
-            require_plausible(checked, readings_mT)
-        print_dry_run(checked, as_json)
-        return
-    folder = _run_folder(checked, out, resume)
+    if assume_gap_mm is not None:
+        finite(assume_gap_mm, "--assume-gap-mm", "mm")
+    if speed is not None:
+        positive(speed, "--speed")
+    folder = None if dry_run else _run_folder(checked, out, resume)
     twin_seed = _twin_seed(checked, twin, seed, readings_mT)
     if speed is not None and twin_seed is None:
         raise InputError("--speed is of the twin's clock; real time has one speed")
     if readings_mT:
         require_plausible(checked, readings_mT)
+    if folder is None:
+        if twin_seed is not None:
+            connect_computed(checked, twin_seed)
+        print_dry_run(checked, as_json)
+        return
     summary = _carry_out(
         checked, folder, resume, readings_mT, assume_gap_mm, twin_seed, live_port, speed
     )

@@ -21,6 +21,9 @@ OWN_DRIVERS = ("grbl", "marlin")
 GROUP = "magbend.stages"
 """Entry points by which other packages offer drivers."""
 
+_FEEDS_MM_MIN = (1.0, 100_000.0)
+"""What a stage of this kind can do; the board's own limit is asked on connecting."""
+
 PositiveNumber = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
@@ -50,7 +53,10 @@ class StageConfig(FileModel):
     axis: Literal["X", "Y", "Z"] = "X"
     gap_at_zero_mm: float | None = None
     direction: Literal[1, -1] = 1
-    feed_mm_min: PositiveNumber = 300.0
+    feed_mm_min: float = Field(
+        default=300.0,
+        json_schema_extra={"minimum": _FEEDS_MM_MIN[0], "maximum": _FEEDS_MM_MIN[1]},
+    )
     backlash_mm: NotNegative = 0.5
     piece_mm: PositiveNumber = 10.0
     homing: Literal["switches", "manual"] = "switches"
@@ -86,6 +92,14 @@ class StageConfig(FileModel):
     @classmethod
     def _may_be_named(cls, port: str, info: ValidationInfo) -> str:
         return allowed_port(port, network=info.data.get("network", False))
+
+    @field_validator("feed_mm_min")
+    @classmethod
+    def _feed_is_of_a_stage(cls, feed_mm_min: float) -> float:
+        low, high = _FEEDS_MM_MIN
+        if not low <= feed_mm_min <= high:
+            raise ValueError(f"must be from {low:g} to {high:.0f} mm/min")
+        return feed_mm_min
 
     @field_validator("driver")
     @classmethod

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -9,6 +10,8 @@ import pytest
 from typer.testing import CliRunner
 
 from magbend.cli.main import app
+from magbend.core.errors import MagbendError
+from magbend.rig import write_templates
 
 # A plan of one gap, quickly settled: the twin's photographs take their time.
 QUICK = "gaps_mm = [70.0]"
@@ -189,3 +192,32 @@ def test_the_dry_run_refuses_the_readings_that_the_run_would(bench_folder, readi
     result = CliRunner().invoke(app, [*words, "--flux-mT", readings])
     assert result.exit_code != 0
     assert "step " not in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("row", "instead", "words", "sentence"),
+    [
+        ('port = "twin://board.json"', 'port = "/dev/ttyS9"', [], "names a real one"),
+        ("direction = 1 ", "direction = -1 ", [], "no gap lies within the travel"),
+        ("zero_mm = 150.0", "zero_mm = -150.0", [], "no gap lies within the travel"),
+        ("min = 300.0", "min = 1e-9", [], "feed_mm_min.* from 1 to 100000 mm/min"),
+        ("min = 300.0", "min = 1e9", [], "feed_mm_min.* from 1 to 100000 mm/min"),
+        ("", "", ["--assume-gap-mm", "nan"], "--assume-gap-mm must be a finite number"),
+        ("", "", ["--speed", "nan"], "--speed must be a finite number"),
+    ],
+)
+def test_the_dry_run_refuses_the_bench_that_the_run_would(
+    tmp_path: Path, row: str, instead: str, words: list[str], sentence: str
+) -> None:
+    write_templates(tmp_path, twin=True)
+    rig = tmp_path / "rig.toml"
+    text = rig.read_text()
+    assert row in text
+    rig.write_text(text.replace(row, instead) if row else text)
+    plan = str(tmp_path / "plan.toml")
+    result = CliRunner().invoke(app, ["rig", "run", plan, "--dry-run", *words])
+    assert isinstance(result.exception, MagbendError)
+    assert re.search(sentence, str(result.exception))
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "rig.toml", "plan.toml", "specimen.toml",
+    }  # fmt: skip

@@ -161,7 +161,8 @@ def test_the_dry_run_predicts_with_the_weight_of_the_bench(plan_file) -> None:
     words = ["rig", "run", str(plan_file), "--dry-run"]
 
     def tip_y_mm(up: str) -> float:
-        rig.write_text(RIG + f"[bench]\nup = {up}\n")
+        whole = RIG.replace('"none"', '"auto"')  # all of the bench is computed
+        rig.write_text(whole + f"[bench]\nup = {up}\n")
         result = CliRunner().invoke(app, [*words, "--json"])
         return json.loads(result.stdout)["steps"][0]["predicted_tip_y_mm"]
 
