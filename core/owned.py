@@ -191,7 +191,9 @@ def _locked(folder: Path, kind: str, command: str) -> Iterator[None]:
 
 
 def _introduce(mark: Path, kind: str, command: str) -> None:
-    """Write what the folder is, once, and who writes it now."""
+    """Sweep up after the dead; say what the folder is, once, and who writes it now."""
+    for leftover in mark.glob(".*.tmp"):
+        leftover.unlink(missing_ok=True)
     if not (mark / FOLDER_FILE).is_file():
         facts = {"schema": SCHEMA, "kind": kind, "made_by": program()}
         text = sealed({**facts, "made_utc": _now()}, indent=1)
@@ -226,7 +228,9 @@ def altered_marks(folder: Path) -> list[str]:
     mark = folder / MARK
     names = []
     found = sorted(mark.iterdir()) if mark.is_dir() else []
-    for path in (one for one in found if not one.is_dir()):
+    for path in found:
+        if path.is_dir() or path.name.endswith(".tmp"):
+            continue  # a write that was cut off has no seal yet
         try:
             data = read_file(path, 0.1, StoreError)
             is_good = data == b"" if path.name == LOCK_FILE else is_whole(data)

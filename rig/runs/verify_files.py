@@ -87,7 +87,9 @@ def check_records(run: Run) -> Iterator[FileFinding]:
     for name in altered_marks(root):
         yield FileFinding(name=name, status="altered", detail="its seal is broken")
     for path in sorted((root / MARK).glob("*")):
-        if path.is_file():
+        if path.name.endswith(".tmp"):
+            yield _unknown(run, f"{MARK}/{path.name}")
+        elif path.is_file():
             yield FileFinding(name=f"{MARK}/{path.name}", status="good")
 
 

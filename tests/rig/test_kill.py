@@ -26,7 +26,7 @@ def start(plan: Path, out: Path, *options: str) -> subprocess.Popen[str]:
     process = subprocess.Popen(
         [sys.executable, str(SCRIPT), str(plan), str(out), *options],
         stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
+        stderr=subprocess.STDOUT,
         text=True,
     )
     assert process.stdout is not None
