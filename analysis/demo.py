@@ -6,7 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..core.errors import StoreError
-from ..rig import read_plan, write_templates
+from ..core.owned import owning_folder
+from ..rig import is_bench, read_plan, write_templates
 from .compare.compare import compare_run, write_comparison
 from .fit.runs import try_fit
 from .report import write_report
@@ -38,10 +39,15 @@ def run_demo(out: Path, *, seed: int, tell: Tell) -> Path:
     Raises
     ------
     StoreError
-        If `out` cannot be written.
+        If `out` cannot be written, or holds what magbend did not make.
     RigError, VisionError
         If a stage of the loop failed; the sentence says which and why.
     """
+    with owning_folder(out, "demo", "demo", ours=is_bench):
+        return _run(out, seed=seed, tell=tell)
+
+
+def _run(out: Path, *, seed: int, tell: Tell) -> Path:
     if not (out / "plan.toml").exists():
         write_templates(out, twin=True)
     plan = read_plan(out / "plan.toml")

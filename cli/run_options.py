@@ -23,6 +23,8 @@ GRAVITY = typer.Option(
     "0 0 -9.81 is a bench seen from above.",
 )
 LOAD = typer.Option(1.0, "--load-factor", help="Factor on the magnetic load.")
+MOST_CLAMP_DEG = 45.0
+"""A clamp further off +x is none of a measured run, whose rod leaves it along +x."""
 UNVERIFIED = typer.Option(
     False, "--unverified", help="Go on with runs whose files were altered; say which."
 )
@@ -72,6 +74,9 @@ def support_of(
     """Return what was asked for; without a word on weight, that of the run."""
     from dataclasses import replace
 
+    from ..core.checks import within
+
+    within(clamp_angle_deg, -MOST_CLAMP_DEG, MOST_CLAMP_DEG, "--clamp-angle-deg", "deg")
     return replace(
         told,
         clamp_angle_deg=clamp_angle_deg,

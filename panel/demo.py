@@ -22,8 +22,16 @@ def prepare_demo(folder: Path, *, seed: int) -> Path:
     Raises
     ------
     StoreError
-        If the folder cannot be written.
+        If the folder cannot be written, or holds what magbend did not make.
     """
+    from ..core.owned import owning_folder
+    from ..rig import is_bench
+
+    with owning_folder(folder, "demo", "demo --panel", ours=is_bench):
+        return _prepared(folder, seed)
+
+
+def _prepared(folder: Path, seed: int) -> Path:
     from ..analysis import open_twin_bench
     from ..rig import SteppedClock, write_templates
     from ..vision import as_photo, calibrate, write_calibration

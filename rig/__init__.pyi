@@ -38,6 +38,9 @@ from .bench.open import (
     open_stage as open_stage,
 )
 from .bench.template import (
+    is_bench as is_bench,
+)
+from .bench.template import (
     write_templates as write_templates,
 )
 from .camera.capture import (

@@ -106,6 +106,11 @@ def _row(key: str, value: str) -> str:
     return f'{key} = "{value}"'.ljust(27)
 
 
+def is_bench(folder: Path) -> bool:
+    """Return whether a folder holds rig and plan, as `write_templates` leaves it."""
+    return all((folder / name).is_file() for name in ("rig.toml", "plan.toml"))
+
+
 def write_templates(folder: Path, *, twin: bool = False) -> tuple[Path, ...]:
     """Write ``rig.toml``, ``plan.toml`` and ``specimen.toml``; overwrite nothing.
 

@@ -228,3 +228,17 @@ def test_posterior_without_emcee_names_the_extra(
     monkeypatch.setitem(sys.modules, "emcee", None)
     with pytest.raises(MissingExtraError, match=r"pip install \"\.\[bayes\]\""):
         sample_posterior(fit)
+
+
+@pytest.mark.parametrize("command", ["fit", "compare", "report"])
+def test_an_impossible_clamp_angle_is_refused_before_the_work(
+    command: str,
+    run: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("magbend.analysis.fit.runs.fit_runs", _must_not_be_called)
+    code, _, err = call(capsys, monkeypatch, command, run, "--clamp-angle-deg", 179)
+    assert code == 1
+    assert "--clamp-angle-deg" in err
+    assert "179" in err

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from magbend.core.errors import ConfigError, InputError
+from magbend.core.errors import ConfigError, InputError, StoreError
 from magbend.panel import Workspace
 from magbend.panel.runs.plan_file import check_plan, write_plan
 from magbend.panel.toml_edit import edited
@@ -176,3 +176,12 @@ def test_a_job_is_the_command_a_person_would_type(panel: Served) -> None:
     assert not panel.command("job", what="erase", runs=[name])["ok"]
     for runs in ([], ["../.."], [".."], "all", [name, "none"]):
         assert not panel.command("job", what="fit", runs=runs)["ok"]
+
+
+def test_a_demo_leaves_the_folder_of_somebody_else_alone(tmp_path):
+    from magbend.panel import prepare_demo
+
+    (tmp_path / "thesis.tex").write_text("mine")
+    with pytest.raises(StoreError, match="was not made by magbend"):
+        prepare_demo(tmp_path, seed=2)
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
