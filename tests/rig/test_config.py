@@ -183,6 +183,12 @@ def test_templates_are_valid_and_never_overwrite(tmp_path: Path, twin: bool) -> 
         write_templates(folder)
 
 
+def test_the_files_in_fixtures_are_those_of_rig_init(tmp_path: Path) -> None:
+    folder = Path(__file__).parents[2] / "fixtures" / "plans"
+    for path in write_templates(tmp_path, twin=True):
+        assert (folder / path.name).read_text() == path.read_text(), path.name
+
+
 @pytest.mark.parametrize("name", ["plan.toml", "inline.toml"])
 def test_the_plans_in_fixtures_are_valid(name: str) -> None:
     folder = Path(__file__).parents[2] / "fixtures" / "plans"
