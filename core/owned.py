@@ -136,7 +136,8 @@ def _make(folder: Path, ours: Callable[[Path], bool]) -> bool:
         raise InputError(f"{folder}: this folder cannot be made: {error}") from None
     else:
         return True
-    is_empty = next(folder.iterdir(), None) is None
+    # Whoever dies while marking leaves the mark's folder, perhaps without its file.
+    is_empty = all(entry.name == MARK for entry in folder.iterdir())
     if not is_empty and not is_marked(folder) and not ours(folder):
         raise StoreError(
             f"{folder}: is not empty and was not made by magbend; name a folder that "

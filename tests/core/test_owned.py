@@ -155,3 +155,13 @@ def test_a_damaged_manifest_is_not_believed(tmp_path):
     with pytest.raises(StoreError, match="altered or damaged"):
         statuses(folder)
     assert (folder / MARK / "folder.json").is_file()
+
+
+def test_a_folder_whose_maker_died_while_marking_it_is_taken(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    (folder / MARK).mkdir(parents=True)
+    (folder / MARK / ".folder.json.1d86e901.tmp").write_text("{")
+    with owning_folder(folder, "run", "rig run"):
+        assert is_marked(folder)
+        (folder / "kept").write_text("")
+    assert not list((folder / MARK).glob(".*.tmp"))
