@@ -89,7 +89,7 @@ def _confirm(stage: GapStage, gap_mm: float, yes: bool) -> None:
     if not doubt:
         return
     if yes:
-        typer.echo(f"note: {doubt}", err=True)
+        say(f"note: {doubt}", err=True)
         return
     if sys.stdin.isatty():
         with answering():

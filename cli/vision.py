@@ -257,6 +257,7 @@ def extract(
     rod = _specimen(specimen, run)
     if rod is not None:
         setting = with_specimen(setting, rod)
+    _refuse_joints_beyond(setting, joints_mm)
     made_with = [path for path in (calibration, bare) if path is not None]
     kept = f"{folder} holds what was measured; --resume goes on from there"
     with owning_folder(folder, "extraction", "vision extract", ours=is_made_by_us):
@@ -342,12 +343,28 @@ def _numbers(text: str) -> tuple[float, ...]:
         values = tuple(float(part) for part in text.split(",") if part.strip())
     except ValueError:
         values = (math.nan,)
-    if not all(math.isfinite(value) and value > 0.0 for value in values):
+    if not all(
+        math.isfinite(value) and value > before
+        for before, value in zip((0.0, *values), values, strict=False)
+    ):
         raise InputError(
-            "--joints-mm must be lengths in mm such as 10,20; "
+            "--joints-mm must be lengths in mm from the clamp, rising, such as 10,20; "
             f"instead received {text!r}"
         )
-    return tuple(sorted(values))
+    return values
+
+
+def _refuse_joints_beyond(setting: Setting, given: str) -> None:
+    """Refuse joints that were given and lie beyond the rod, where its length is known.
+
+    A specimen's own joints lie within it.
+    """
+    length_mm, joints_mm = setting.length_mm, setting.joints_mm
+    if given and length_mm and joints_mm and joints_mm[-1] >= length_mm:
+        raise InputError(
+            f"--joints-mm must lie within the rod's {length_mm:g} mm; "
+            f"instead received {joints_mm[-1]:g} mm"
+        )
 
 
 def _design(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import struct
+import zlib
 from typing import Any
 
 from .errors import MagbendError, VisionError
@@ -149,11 +150,16 @@ def _png_size(data: bytes) -> tuple[int, int] | None:
 
 
 def _png_whole(data: bytes) -> bool:
-    """Walk the chunks to IEND, as the file's own lengths tell."""
+    """Walk the chunks to IEND, as the file's own lengths and checksums tell."""
     place = 8
     while place + 12 <= len(data):
         (length,) = struct.unpack(">I", data[place : place + 4])
-        if place + 12 + length > len(data):
+        end = place + 8 + length
+        if end + 4 > len(data):
+            return False
+        if zlib.crc32(memoryview(data)[place + 4 : end]) != int.from_bytes(
+            data[end : end + 4], "big"
+        ):
             return False
         if data[place + 4 : place + 8] == b"IEND":
             return True

@@ -77,12 +77,15 @@ def read_toml(path: Path, model: type[Model]) -> Model:
         value that cannot be: one sentence with file, line, key and what is expected.
     """
     text = read_text(path)
-    is_json = text.lstrip().startswith("{")
+    is_list = path.suffix.lower() == ".json" and text.lstrip().startswith("[")
+    is_json = is_list or text.lstrip().startswith("{")
     try:
         data = parse_json(text.encode()) if is_json else _parse_toml(text)
     except (ValueError, RecursionError) as error:
         kind = "JSON" if is_json else "TOML"
         raise ConfigError(f"{path}: is not valid {kind}: {_short(error)}") from None
+    if is_list:
+        raise ConfigError(f"{path}: must hold one JSON object, in braces, not a list")
     try:
         return model.model_validate(data)
     except ValidationError as error:

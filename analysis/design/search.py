@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.checks import within
-from ...core.errors import SolverError
+from ...core.errors import InputError, SolverError
 from ...core.notebook import Tabular, axes_or_new
 from ...core.specimen import Specimen
 from ...core.specimen_file import specimen_dict
-from ...sim import Field, solve, solve_shapes
+from ...sim import Field, UniformField, solve, solve_shapes
 from ..library.space import sobol_points
 from . import goals
 from .goals import Goal
@@ -168,10 +168,14 @@ def design_all(
 
     Raises
     ------
+    InputError
+        If a rod shall bend in a uniform field along it, which bends none.
     SolverError
         If no design meets them all: how near one comes, and which limits bind.
     """
     count = int(within(count, 1, 100, "count", ""))
+    for goal, field in tasks:
+        _refuse_field_along(goal, field)
     found, norms = _search(tasks, makeable, seed)
     table = rods(makeable, found)
     rng = np.random.default_rng(seed)
@@ -456,6 +460,16 @@ def as_dict(found: Design, goal: Goal) -> dict[str, object]:
             for one in found.more
         ]
     return data
+
+
+def _refuse_field_along(goal: Goal, field: Field) -> None:
+    if goal.kind not in ("radius", "angle") or not isinstance(field, UniformField):
+        return
+    if abs(math.sin(math.radians(field.angle_deg))) < 1e-9:
+        raise InputError(
+            f"a field at {field.angle_deg:g} deg runs along the rod and does not bend "
+            f"it, so none gets {goal.words}; give a field across it, such as 90 deg"
+        )
 
 
 def _unreachable(

@@ -115,6 +115,13 @@ def test_what_cannot_be_reached_says_how_near_and_why():
     assert "total_length_mm fixed at 30 mm" in sentence
 
 
+@pytest.mark.parametrize("angle_deg", [0.0, 180.0, -360.0])
+@pytest.mark.parametrize("goal", [goals.radius_goal(100.0), goals.angle_goal(5.0)])
+def test_a_field_along_the_rod_is_told_to_bend_nothing(goal, angle_deg):
+    with pytest.raises(InputError, match="along the rod and does not bend it"):
+        find_designs(goal, UniformField(flux_mT=50.0, angle_deg=angle_deg), FREE)
+
+
 def test_recipes_and_moulds_of_the_paper():
     limits = Makeable(recipe=list(PAPER_RECIPES), sides_mm=list(PAPER_SIDES_MM))
     found = find_designs(goals.angle_goal(20.0), FIELD, limits, count=3)

@@ -93,3 +93,11 @@ def test_what_is_no_picture_is_a_sentence():
             with pytest.raises(CameraError) as caught:
                 decode_picture(data, "x", CameraError)
             assert "\n" not in str(caught.value)
+
+
+def test_a_png_with_a_wrong_checksum_is_damaged_and_libpng_says_nothing(capfd):
+    data = bytearray(coded(".png"))
+    data[data.index(b"IDAT") + 8] ^= 0x55
+    with pytest.raises(CameraError, match="cut off or damaged"):
+        decode_picture(bytes(data), "x", CameraError)
+    assert capfd.readouterr() == ("", "")
