@@ -131,7 +131,7 @@ def report(
         return
     for comparison in failed:
         say(
-            f"{comparison.run}, step {comparison.step.index}: {comparison.status}",
+            f"{comparison.run}, step {comparison.step.index + 1}: {comparison.status}",
             err=True,
         )
     tell_left_out(left_out, len(done))

@@ -53,7 +53,7 @@ def print_fit(result: FitResult, path: Path, posterior: dict[str, Any] | None) -
     """Print what was fitted, how sure it is, and where it was written."""
     say(
         f"{result.specimen.name}: {result.steps} steps, model {result.model}, "
-        f"{result.rms_um:.2g} um RMS left, reduced chi2 {result.chi2_reduced:.2f}, "
+        f"{result.rms_um:.2g} µm RMS left, reduced chi2 {result.chi2_reduced:.2f}, "
         f"condition number {result.condition_number:.3g}"
     )
     again = (*result.E_sd_statistical_MPa, *[math.nan] * len(result.parameters))

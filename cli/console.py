@@ -91,18 +91,23 @@ def _bar(what: str) -> Iterator[Progress]:
 
 
 class _PlainLines:
-    """Print a line at the end and, on long work, one every ten seconds."""
+    """Print a line at the end and, on long work, one every ten seconds.
+
+    The time left is judged from the items alone: from when none was said to be done.
+    """
 
     def __init__(self, what: str) -> None:
         self._what = what
-        self._start = self._last = time.monotonic()
+        self._start = self._last = self._first = time.monotonic()
 
     def __call__(self, done: int, total: int) -> None:
         now = time.monotonic()
+        if not done:
+            self._first = now
         if done < total and now - self._last < 10.0:
             return
         self._last = now
         elapsed = now - self._start
-        left = elapsed * (total - done) / done if done else float("nan")
+        left = (now - self._first) * (total - done) / done if done else float("nan")
         remaining = f", {left:.0f} s left" if done and done < total else ""
         say(f"{self._what}: {done}/{total}, {elapsed:.0f} s{remaining}", err=True)

@@ -140,8 +140,8 @@ def comsol_table(runs: Sequence[RunComparison]) -> str:
                 continue
             if not math.isfinite(step.flux_mT):
                 raise InputError(
-                    f"{run.run.label}, step {step.index}: has no flux density, which "
-                    "is the first argument of a table for COMSOL"
+                    f"{run.run.label}, step {step.index + 1}: has no flux density, "
+                    "which is the first argument of a table for COMSOL"
                 )
             rows += [
                 (T_from_mT(step.flux_mT), *values)

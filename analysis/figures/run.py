@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.text import Annotation
 
 Array = NDArray[np.float64]
 
@@ -53,23 +55,57 @@ def draw_shapes(axes: Axes, run: RunComparison) -> None:
     for comparison in run.comparisons:
         _draw_simulated(axes, comparison, label=_first(run, comparison))
     seen = _measured(run)
+    names = []
     for comparison in seen:
         frame = comparison.frame
         if frame is None or frame.centreline is None:
             continue
         label = "measured" if comparison is seen[0] else None
         _draw_points(axes, frame, label).set_gid(f"measured, {step_label(comparison)}")
-        axes.annotate(
+        name = axes.annotate(
             step_label(comparison), frame.centreline.tip_mm, xytext=(5, 0),
             textcoords="offset points", va="center", fontsize=7, color=INK,
+            arrowprops={"arrowstyle": "-", "color": FAINT, "linewidth": 0.5,
+                        "relpos": (0.0, 0.5), "shrinkA": 0.0, "shrinkB": 2.0},
         )  # fmt: skip
+        names.append(name)
     length = run.run.specimen.length_mm
     axes.plot([0, length], [0, 0], color=FAINT, linewidth=0.8, dashes=(1, 2))
     axes.set_xlabel("x along the undeformed rod (mm)")
     axes.set_ylabel("y (mm)")
     axes.set_aspect("equal", adjustable="datalim")
-    axes.margins(x=0.16, y=0.1)
+    axes.margins(x=0.24, y=0.1)
     axes.legend(loc="upper left" if _bends_up(seen) else "lower left")
+    _part(axes, names)
+
+
+def _part(axes: Axes, names: list[Annotation]) -> None:
+    """Move names at tips that lie close to each other apart, up and down."""
+    from matplotlib.text import Text
+
+    figure = axes.get_figure(root=True)
+    if figure is None:
+        return
+    figure.draw_without_rendering()  # only then is known where the tips come to lie
+    boxes = [Text.get_window_extent(name) for name in names]  # without the lines
+    middles = np.array([0.5 * (box.y0 + box.y1) for box in boxes])
+    shifts = np.zeros(len(names))
+    order = [int(k) for k in np.argsort(middles, kind="stable")]
+    for _ in range(100):
+        for below, above in combinations(order, 2):
+            a, b = boxes[below], boxes[above]
+            if a.x1 < b.x0 or b.x1 < a.x0:
+                continue
+            lies = middles[above] + shifts[above] - middles[below] - shifts[below]
+            push = 0.5 * max(0.0, 0.5 * (a.height + b.height) - lies)
+            shifts[below] -= push
+            shifts[above] += push
+    for name, shift in zip(names, shifts, strict=True):
+        shift_pt = float(shift) * 72.0 / figure.dpi
+        is_far = abs(shift_pt) > 4.0
+        name.set_position((9.0 if is_far else 5.0, shift_pt))
+        if name.arrow_patch is not None:
+            name.arrow_patch.set_visible(is_far)
 
 
 def _draw_points(axes: Axes, frame: Frame, label: str | None) -> Artist:

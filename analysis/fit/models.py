@@ -75,10 +75,10 @@ def model_sentence(models: tuple[ModelFit, ...]) -> str:
         ]
         moved = f", moduli {min(change):+.1f} to {max(change):+.1f} %" if change else ""
         parts.append(
-            f"{_NAMES[other.model]} leaves {other.rms_um:.2g} um "
+            f"{_NAMES[other.model]} leaves {other.rms_um:.2g} µm "
             f"(AIC +{lead:.3g}{moved})"
         )
     return (
-        f"{_NAMES[best.model]} leaves {best.rms_um:.2g} um RMS and is preferred: "
+        f"{_NAMES[best.model]} leaves {best.rms_um:.2g} µm RMS and is preferred: "
         f"{'; '.join(parts)}"
     )

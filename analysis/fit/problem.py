@@ -330,7 +330,7 @@ def _collect(
         for step in run.steps:
             found = _shot(run, step, model, nobody._replace(photograph=len(shots)))
             if isinstance(found, str):
-                skipped.append(f"{run.label}, step {step.index}: {found}")
+                skipped.append(f"{run.label}, step {step.index + 1}: {found}")
                 continue
             seen = run.frame(step)
             clamp = seen.shared_clamp if seen else ""
@@ -361,7 +361,7 @@ def _shot(run: RunData, step: Step, model: str, owner: Owner) -> Shot | str:
     stated = np.where(np.isfinite(frame.sigma_mm), frame.sigma_mm, UNKNOWN_SIGMA_MM)
     return Shot(
         owner=owner,
-        label=f"{run.label}, step {step.index}",
+        label=f"{run.label}, step {step.index + 1}",
         specimen=run.specimen,
         field=field,
         line=line,

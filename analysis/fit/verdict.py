@@ -80,8 +80,8 @@ def _reasons(
     if p_value < DOUBTFUL:
         reasons.append(
             f"a right model would look as bad in {100.0 * p_value:.2g} % of all runs: "
-            f"{result.rms_um:.2g} um RMS are left along the lines, whose own errors "
-            f"are about {np.median(result.noise_um):.2g} um"
+            f"{result.rms_um:.2g} µm RMS are left along the lines, whose own errors "
+            f"are about {np.median(result.noise_um):.2g} µm"
         )
     shots = len(result.problem.shots)
     reasons += [

@@ -32,7 +32,7 @@ def report_imported(
     rod_height_mm : float or None
         Height of the rods' axes above the board's plane; None takes the calibration's.
     progress : callable
-        Told after each run.
+        Told after each run; of the last one when the report is written.
 
     Raises
     ------
@@ -45,11 +45,12 @@ def report_imported(
             _measure(run, rod_height_mm)
         done.append(compare_run(load_run(run.path)))
         write_comparison(run.path / "comparison.csv", [done[-1]])
-        progress(index, len(runs) + 1)
+        if index < len(runs):
+            progress(index, len(runs))
     check_any(done)
     write_comparison(html.with_name("comparison.csv"), done)
     write_report(done, html, by_number=gmc_numbers(done))
-    progress(len(runs) + 1, len(runs) + 1)
+    progress(len(runs), len(runs))
     return html
 
 

@@ -76,7 +76,7 @@ def write_package(
     fits : sequence of FitResult, str or None
         One a run, for the figures.
     progress : callable
-        Told after every file.
+        Told with 0 before the first file, and after every file.
 
     Raises
     ------
@@ -128,6 +128,7 @@ def _zip(
     entries = []
     try:
         with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
+            progress(0, len(files))  # what came before tells nothing of the rest
             for count, (name, path) in enumerate(files, start=1):
                 entries.append(_add(archive, name, path))
                 progress(count, len(files))

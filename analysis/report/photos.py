@@ -70,7 +70,7 @@ def photograph_svg(
     if not done:
         return ""
     encoded = base64.b64encode(np.asarray(data).tobytes()).decode("ascii")
-    title = escape(f"{run.run.label}, step {first.step.index}")
+    title = escape(f"{run.run.label}, step {first.step.index + 1}")
     parts = [
         f'<svg class="photo" viewBox="{x0} {y0} {x1 - x0} {y1 - y0}" role="img">'
         f"<title>{title}</title>"

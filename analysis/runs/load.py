@@ -139,7 +139,7 @@ def load_run(path: Path | str, *, unverified: bool = False) -> RunData:
     frames = _frames(path)
     for step in steps:
         if step.image not in frames:
-            warnings.append(f"step {step.index}: {step.image} was never measured")
+            warnings.append(f"step {step.index + 1}: {step.image} was never measured")
     return RunData(
         path=path,
         id=str(record.get("id", path.name)),

@@ -6,11 +6,13 @@ import csv
 import json
 import re
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from analysis_factory import write_run
+from matplotlib.text import Text
 from typer.testing import CliRunner
 
 from magbend.analysis import compare_run, load_run
@@ -119,3 +121,16 @@ def test_without_a_magnet_there_is_no_bench_and_no_field(run):
 def test_a_width_no_page_has_is_refused(run):
     with pytest.raises(InputError, match="width of a figure must be from 60 to 400 mm"):
         shapes_figure(run, width_mm=8.8)
+
+
+def test_names_at_tips_close_together_do_not_overlap(tmp_path):
+    path = write_run(tmp_path / "near", gaps_mm=(70.0, 69.0, 68.0, 60.0))
+    near = compare_run(load_run(path))
+    figure = shapes_figure(near, width_mm=88.0)
+    figure.draw_without_rendering()
+    names = [text for text in figure.axes[0].texts if text.get_text().endswith("mT")]
+    boxes = sorted((Text.get_window_extent(name) for name in names), key=lambda b: b.y0)
+    assert len(boxes) == 4
+    for below, above in pairwise(boxes):
+        assert above.y0 > below.y1 - 1.0
+    assert max(box.x1 for box in boxes) < figure.bbox.x1

@@ -243,7 +243,7 @@ def test_failed_frames_are_left_out_and_named(tmp_path: Path) -> None:
     run = load_run(write_run(tmp_path / "a", failed=[0]))
     fit = fit_runs([run])
     assert fit.steps == 2
-    assert "step 0: failed frame" in fit.skipped[0]
+    assert "step 1: failed frame" in fit.skipped[0]
     with pytest.raises(StoreError, match="no step can be fitted"):
         fit_runs([load_run(write_run(tmp_path / "b", failed=[0, 1, 2]))])
 

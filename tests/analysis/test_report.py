@@ -80,6 +80,8 @@ def test_failed_frame_is_said_loudly(single: Path) -> None:
     page = Page(single.read_text())
     assert "1 of 3 steps could not be compared" in page.text
     assert "failed frame: no rod was found" in page.text
+    assert "Step 2 (60.0 mm gap)" in page.text  # as the run counts them
+    assert "Step 0" not in page.text
     assert 'role="alert"' in single.read_text()
 
 
