@@ -30,6 +30,7 @@ export function make(root) {
   const aside = h("div", {class: "stack", hidden: true}, live.element, camera.element);
   fill(root, h("h1", {class: "hidden-title"}, "Set up"), h("div", {class: "path"}, h("nav", {class: "card", "aria-label": "Steps"}, list), panel, aside));
   view = {list, panel, live, camera, aside};
+  panel.addEventListener("input", () => { isTyped = true; });
   load(true);
 }
 
@@ -47,11 +48,12 @@ async function load(first = false) {
   loadedAt = performance.now();
   if (first || !chosen) chosen = (known.steps.find((step) => !step.done) ?? known.steps[0]).name;
   drawList();
-  drawStep();
+  if (!isTyped) drawStep();
   return null;
 }
 
 async function doIt(name, values = {}, next = false) {
+  isTyped = false;
   const answer = await act(name, values);
   await new Promise((resolve) => setTimeout(resolve, 300));
   if (answer && next) go(1);
@@ -60,6 +62,7 @@ async function doIt(name, values = {}, next = false) {
 }
 
 async function save(values, step) {
+  isTyped = false;
   const answer = await act("setup-rig", {values}, true);
   if (answer && step) await act("setup-done", {step}, true);
   if (answer) toast("written into the rig file");
@@ -77,6 +80,7 @@ function drawList() {
 }
 
 function drawStep() {
+  isTyped = false;
   markPoints(view.live.screen, []);
   const make_ = makers[chosen];
   const index = known.steps.findIndex((step) => step.name === chosen);
@@ -246,6 +250,8 @@ async function watchBoard() {
 }
 
 let seenKey = "";
+// What was typed and not sent yet is not drawn over.
+let isTyped = false;
 export function render(state) {
   view.live.render(state);
   view.camera.render(state);
@@ -256,7 +262,7 @@ export function render(state) {
   const jobs = document.getElementById("setup-jobs");
   if (jobs) showJobs(jobs, state.jobs.filter((job) => job.what === "scan-field").slice(0, 1));
   const key = JSON.stringify([state.bench.open, state.bench.facts.position_state, state.files.calibration, state.files.rig, state.jobs.map((job) => job.status), Object.keys(state.bench.facts).length]);
-  if (key !== seenKey && performance.now() - loadedAt > 500 && !view.panel.contains(document.activeElement?.closest("input, select, textarea") ?? null)) {
+  if (key !== seenKey && !isTyped && performance.now() - loadedAt > 500 && !view.panel.contains(document.activeElement?.closest("input, select, textarea") ?? null)) {
     seenKey = key;
     load();
   }
