@@ -96,7 +96,7 @@ class FolderCamera:
         if self._index >= len(self._paths):
             raise CameraError(
                 f"{self._folder}: must hold a picture for every step; instead it holds "
-                f"{len(self._paths)} and step {self._index} was asked for"
+                f"{len(self._paths)} and step {self._index + 1} was asked for"
             )
         image = read_image(self._paths[self._index])
         wait_s = max(time_s - self._clock.monotonic_s(), 0.0) + _POLL_S

@@ -34,9 +34,9 @@ def _is_unit(unit: str) -> str:
 
 
 def _repeats_repeats(pattern: str) -> bool:
-    """Return whether a group with a repetition inside is itself repeated."""
+    """Return whether a group that holds a repetition or a choice is itself repeated."""
     outer = [re.escape(sign) for sign in "*+"] + [r"\{\d+(?:,\d*)?\}"]
-    inside = r"\((?:[^()\\]|\\.|\[[^\]]*\])*(?<!\\)[*+{](?:[^()\\]|\\.)*\)"
+    inside = r"\((?:[^()\\]|\\.|\[[^\]]*\])*(?<!\\)[*+{|](?:[^()\\]|\\.)*\)"
     flat = re.sub(r"\[(?:\\.|[^\]\\])*\]", "x", pattern)
     while True:
         if re.search(rf"{inside}(?:{'|'.join(outer)})", flat):
@@ -56,8 +56,9 @@ def _is_pattern(pattern: str) -> str:
         raise ValueError(f"must be a regular expression ({error})") from None
     if _repeats_repeats(pattern):
         raise ValueError(
-            "must not repeat a part that holds a repetition itself, such as (a+)+: a "
-            "reply that does not fit would be looked at for ever"
+            "must not repeat a part that holds a repetition or a choice itself, such "
+            "as (a+)+ or (a|b)+, of which [ab]+ is the safe form: a reply that does "
+            "not fit would be looked at for ever"
         )
     if "value" not in groups:
         raise ValueError("must have a named group (?P<value>...)")

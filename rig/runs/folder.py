@@ -157,7 +157,7 @@ class RunFolder:
         """
         index = record["index"]
         if index in self.done:
-            raise StoreError(f"{self.path}: step {index} is recorded already")
+            raise StoreError(f"{self.path}: step {index + 1} is recorded already")
         files = [
             {"path": name, "sha256": sha256_of(data), "bytes": len(data)}
             for name, data in images.items()
@@ -223,7 +223,7 @@ class RunFolder:
         for index, seal in self.done.items():
             if recorded.get(index) != seal:
                 what = "altered" if index in recorded else "missing"
-                return f"step {index} was recorded and is {what} in {STEPS_FILE}"
+                return f"step {index + 1} was recorded and is {what} in {STEPS_FILE}"
         for step in steps:
             for file in step["files"]:
                 path = self.path / file["path"]

@@ -60,7 +60,7 @@ def map_problems(run: Run) -> Iterator[str]:
     for step in run.steps:
         problem = _step_problem(step, maps, arrived_mm)
         if problem:
-            yield f"step {step['index']}: {problem}"
+            yield f"step {step['index'] + 1}: {problem}"
 
 
 def _maps(run: Run) -> Iterator[dict[str, Any]]:

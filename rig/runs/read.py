@@ -180,7 +180,7 @@ def read_steps(path: Path) -> StepLines:
             ) from None
     doubled = [i for i, n in Counter(step["index"] for step in steps).items() if n > 1]
     if doubled:
-        raise StoreError(f"{path}: step {min(doubled)} is recorded more than once")
+        raise StoreError(f"{path}: step {min(doubled) + 1} is recorded more than once")
     return StepLines(steps=tuple(steps), whole_bytes=whole_bytes, torn=torn)
 
 

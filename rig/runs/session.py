@@ -117,7 +117,7 @@ class Session:
             if index in self.folder.done:
                 continue
             record = self._take_step(index, stop)
-            self.flagged += [f"step {index}: {flag}" for flag in record["flags"]]
+            self.flagged += [f"step {index + 1}: {flag}" for flag in record["flags"]]
             self.state.expect_end(left.after(index))
             self.state.tell(
                 gap_mm=record["gap_reached_mm"],

@@ -101,21 +101,23 @@ def _steps(run: Run) -> list[str]:
     indices = {step["index"] for step in run.steps}
     if run.is_finished:
         missing = sorted(set(range(len(gaps_mm))) - indices)
-        problems += [f"step {index}: missing from a finished run" for index in missing]
+        problems += [
+            f"step {index + 1}: missing from a finished run" for index in missing
+        ]
     for step in run.steps:
         index = step["index"]
         if not 0 <= index < len(gaps_mm):
-            problems.append(f"step {index}: is not in the plan")
+            problems.append(f"step {index + 1}: is not in the plan")
         elif step.get("gap_mm") != gaps_mm[index]:
             problems.append(
-                f"step {index}: gap_mm is {step.get('gap_mm')}, the plan says "
+                f"step {index + 1}: gap_mm is {step.get('gap_mm')}, the plan says "
                 f"{gaps_mm[index]}"
             )
         asked = settings[index] if 0 <= index < len(settings) else {}
         off = _off(step.get("settings") or {}, asked, run.manifest)
-        problems += [f"step {index}: {sentence}" for sentence in off]
+        problems += [f"step {index + 1}: {sentence}" for sentence in off]
         if not step["files"]:
-            problems.append(f"step {index}: has no photograph")
+            problems.append(f"step {index + 1}: has no photograph")
     counted = (run.end or {}).get("steps", len(run.steps))
     if counted != len(run.steps):
         problems.append(

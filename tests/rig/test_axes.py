@@ -75,7 +75,7 @@ def test_each_value_is_taken_at_each_gap_and_the_current_ends_at_rest(tmp_path):
     lines[2] = lines[2].replace('"current_A": 1.5', '"current_A": 1.4')
     path.write_text("\n".join(lines) + "\n")
     problems = "\n".join(verify_run(tmp_path / "run"))
-    assert "step 2: current_A is 1.4, the plan says 1.5" in problems
+    assert "step 3: current_A is 1.4, the plan says 1.5" in problems
 
 
 @pytest.mark.parametrize(

@@ -73,10 +73,10 @@ def test_a_fault_strikes_at_its_moment_and_the_run_ends_by_name(
     [
         (
             'kind = "meter overload"\nat_step = 1\nfor_s = 6.0',
-            ["step 1: flux_overload"],
+            ["step 2: flux_overload"],
         ),
-        ('kind = "meter silence"\nat_gap_mm = 52.0', ["step 2: flux_silent"]),
-        ('kind = "camera dark"\nat_step = 2', ["step 2: brightness_drift"]),
+        ('kind = "meter silence"\nat_gap_mm = 52.0', ["step 3: flux_silent"]),
+        ('kind = "camera dark"\nat_step = 2', ["step 3: brightness_drift"]),
     ],
 )
 def test_faults_of_meter_and_lamp_are_flags(

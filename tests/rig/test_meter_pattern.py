@@ -30,6 +30,7 @@ name = "mT"
     [
         r"(?P<value>(\d+)+)x",
         r"(?P<value>\d+)(a*)*b",
+        r"(?P<value>\d+)(a|a)+b",
         r"(?P<value>([0-9]+\.?)*)",
         r"((a+)b?)+(?P<value>\d)",
         r"(?P<value>\d)" + "a?" * 200,

@@ -251,7 +251,7 @@ def test_verify_knows_a_gap_that_is_not_the_maps(make_bench, tmp_path):
     manifest["map"]["gap_at_zero_mm"] = 170.5
     (tmp_path / "run" / "run.json").write_text(json.dumps(manifest))
     problems = "\n".join(verify_run(tmp_path / "run"))
-    assert "step 0: its map (gap_at_zero_mm = 150)" in problems
+    assert "step 1: its map (gap_at_zero_mm = 150)" in problems
 
 
 def test_verify_finds_the_mixed_maps_of_older_runs(make_bench, tmp_path):
@@ -264,7 +264,7 @@ def test_verify_finds_the_mixed_maps_of_older_runs(make_bench, tmp_path):
     steps[1]["stage_mm"] += 20.5
     path.write_text("".join(json.dumps(step) + "\n" for step in steps))
     problems = "\n".join(verify_run(tmp_path / "run"))
-    assert "step 1: stage_mm = -69.5 is a gap of 80.5 mm by the map, not 60 mm" in (
+    assert "step 2: stage_mm = -69.5 is a gap of 80.5 mm by the map, not 60 mm" in (
         problems
     )
 

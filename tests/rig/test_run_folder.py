@@ -71,14 +71,14 @@ def test_damage_before_the_last_line_is_refused(path: Path) -> None:
     with pytest.raises(StoreError, match=r"line 1: is damaged"):
         read_run(path)
     (path / "steps.jsonl").write_text(text + text)
-    with pytest.raises(StoreError, match="step 0 is recorded more than once"):
+    with pytest.raises(StoreError, match="step 1 is recorded more than once"):
         read_run(path)
 
 
 def test_a_step_is_recorded_once(path: Path) -> None:
     folder = RunFolder.create(path, MANIFEST, "plan")
     commit(folder, 0)
-    with pytest.raises(StoreError, match="step 0 is recorded already"):
+    with pytest.raises(StoreError, match="step 1 is recorded already"):
         commit(folder, 0)
 
 
@@ -197,7 +197,7 @@ def test_interrupts_wait_for_the_record(path: Path, monkeypatch) -> None:
             lambda p: (p / "steps.jsonl").write_text(
                 (p / "steps.jsonl").read_text().splitlines()[0] + "\n"
             ),
-            "step 1: missing from a finished run",
+            "step 2: missing from a finished run",
         ),
     ],
 )

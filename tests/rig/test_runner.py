@@ -200,21 +200,21 @@ def test_overload_and_silence_are_flags_not_numbers(make_bench, tmp_path: Path) 
     assert summary.status == "success"
     assert [s["flux_status"] for s in steps] == ["ok", "silent", "overload"]
     assert [s["flux_mT"] is None for s in steps] == [False, True, True]
-    assert summary.flagged == ("step 1: flux_silent", "step 2: flux_overload")
+    assert summary.flagged == ("step 2: flux_silent", "step 3: flux_overload")
 
 
 def test_a_rod_that_never_rests_is_flagged(make_bench, tmp_path: Path) -> None:
     bench = make_bench(camera={"swing_mm": 4.0, "damping_s": 1e9})
     summary = run(bench.plan, bench.devices, tmp_path / "out")
     assert summary.status == "success"
-    assert "step 0: settle_timeout" in summary.flagged
+    assert "step 1: settle_timeout" in summary.flagged
 
 
 def test_a_lamp_that_fails_is_flagged(make_bench, tmp_path: Path) -> None:
     frames = dict.fromkeys(range(12, 60), "dark")
     bench = make_bench(camera={"faults": frames})
     summary = run(bench.plan, bench.devices, tmp_path / "out")
-    assert "step 2: brightness_drift" in summary.flagged
+    assert "step 3: brightness_drift" in summary.flagged
 
 
 def test_a_photograph_during_motion_is_not_recorded(bench, tmp_path: Path) -> None:

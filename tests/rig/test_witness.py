@@ -105,7 +105,7 @@ def test_lost_steps_of_the_twin_are_found_by_the_field(tmp_path, policy):
         assert "step 2 is recorded and flagged" in summary.reason
     else:
         assert summary.status == "success"
-        assert "step 1: field_disagrees" in summary.flagged
+        assert "step 2: field_disagrees" in summary.flagged
 
 
 def test_a_good_run_of_the_twin_is_not_flagged(tmp_path):
