@@ -60,7 +60,7 @@ def design(
     field_angle_deg: float = typer.Option(
         90.0, "--field-angle-deg", help="Direction of the uniform field from +x."
     ),
-    magnet: Path | None = typer.Option(None, "--magnet", help="Magnet file."),
+    magnet: Path | None = typer.Option(None, "--magnet", help="Magnet or source file."),
     gap_mm: float | None = typer.Option(None, "--gap-mm", help="Gap of the magnet."),
     count: int = typer.Option(5, "--count", help="How many distinct designs."),
     makeable: Path | None = typer.Option(
@@ -180,12 +180,12 @@ def _path(
 ) -> list[Task]:
     from ..analysis import read_path
     from ..core.errors import InputError
-    from ..core.specimen_file import read_magnet
+    from ..sim import read_field
 
     if any(value is not None for value in given):
         raise InputError("--path has its own goals and fields; give no other")
     return read_path(
-        path, angle_deg=angle_deg, magnet=read_magnet(magnet) if magnet else None
+        path, angle_deg=angle_deg, magnet=read_field(magnet) if magnet else None
     )
 
 
@@ -232,19 +232,22 @@ def _field(
     flux_mT: float | None, angle_deg: float, magnet: Path | None, gap_mm: float | None
 ) -> Field:
     from ..core.errors import InputError
-    from ..core.specimen_file import read_magnet
-    from ..sim import MagnetField, UniformField
+    from ..sim import UniformField, read_field
 
+    if flux_mT == 0.0 and magnet is None:
+        raise InputError(
+            "--field-mT must not be zero: without a field no rod bends; "
+            f"instead received {flux_mT:g} mT"
+        )
     if flux_mT is not None and magnet is None and gap_mm is None:
-        if flux_mT == 0.0:
-            raise InputError(
-                "--field-mT must not be zero: without a field no rod bends; "
-                f"instead received {flux_mT:g} mT"
-            )
         return UniformField(flux_mT=flux_mT, angle_deg=angle_deg)
-    if flux_mT is None and magnet is not None and gap_mm is not None:
-        return MagnetField(magnet=read_magnet(magnet), gap_mm=gap_mm)
-    raise InputError("give either --field-mT, or --magnet and --gap-mm")
+    field = read_field(magnet) if magnet is not None and flux_mT is None else None
+    if field is None or field.follows_gap != (gap_mm is not None):
+        raise InputError(
+            "give either --field-mT, or --magnet and --gap-mm; no gap where all "
+            "sources of the file have their place"
+        )
+    return field if gap_mm is None else field.at_gap(gap_mm)
 
 
 def _range(text: str | None, option: str) -> tuple[float, float] | None:

@@ -55,6 +55,9 @@ from .fields import (
 from .fields import (
     UniformField as UniformField,
 )
+from .fields import (
+    before as before,
+)
 from .magnet.field import (
     magnet_flux_mT as magnet_flux_mT,
 )

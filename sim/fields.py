@@ -289,19 +289,46 @@ def refuse_outside(
     InputError
         If one of its points, in units of `unit_mm`, does.
     """
-    if type(field) is not Field:
-        return
-    if not any(source.kind == "map" for source in field.sources):
+    maps = _maps(field)
+    if not maps:
         return
     points_mm = np.column_stack([x, y, 0.0 * x if z is None else z]) * unit_mm
-    for source in field.sources:
-        holds = getattr(source, "holds", None)
-        if holds is not None and not holds(points_mm):
+    for source in maps:
+        if not source.holds(points_mm):
             raise InputError(
                 "the rod leaves the box of the map of the field, from "
-                f"{source.low_mm.tolist()} to {source.high_mm.tolist()} mm: measure "  # type: ignore[attr-defined]
+                f"{source.low_mm.tolist()} to {source.high_mm.tolist()} mm: measure "
                 "farther out"
             )
+
+
+def outside(
+    field: Field, curves: NDArray[np.float64], unit_mm: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """Tell of planar rods which leave the box of a map.
+
+    Parameters
+    ----------
+    field : Field
+    curves : ndarray, shape (n, 2, points)
+        x and y of each rod, in units of its own.
+    unit_mm : ndarray, shape (n,)
+        These units.
+    """
+    left = np.zeros(len(curves), dtype=np.bool_)
+    maps = _maps(field)
+    if maps:
+        points_mm = np.zeros((len(curves), curves.shape[2], 3))
+        points_mm[..., :2] = curves.transpose(0, 2, 1) * unit_mm[:, None, None]
+        for source in maps:
+            left |= ~source.holds(points_mm)
+    return left
+
+
+def _maps(field: Field) -> list[Any]:
+    if type(field) is not Field:
+        return []
+    return [source for source in field.sources if source.kind == "map"]
 
 
 def check_plain(specimen: Specimen) -> None:

@@ -125,7 +125,7 @@ def solve(
         refuse_outside(field, x, y, length_mm)
         if index > 0 and np.all(np.abs(kappa) < STRAIGHT):
             buckled = buckled_tips(case, length_mm)
-        stable_in_space = index == 0 and swing_index(rod, flux, tip, STEP) == 0
+        stable_in_space = index == 0 and _holds(specimen, support, rod, flux, tip)
     return Solution(
         centreline=centreline,
         status=STATUS[outcome],
@@ -138,6 +138,18 @@ def solve(
         ending=ending(case, load, length_mm) if outcome == GONE else None,
         buckled_tips_mm=buckled,
     )
+
+
+def _holds(
+    specimen: Specimen, support: Support, rod: Array, flux: Array, tip: Array
+) -> bool | None:
+    """Tell whether a rod that is stable in the plane stays in it; None: not known."""
+    if specimen.shape != "rectangle":
+        return bool(swing_index(rod, flux, tip, STEP) == 0)
+    from .spatial.beside import index_in_space
+
+    index = index_in_space(specimen, support, flux, tip)
+    return None if index < 0 else index == 0
 
 
 @lru_cache(maxsize=256)

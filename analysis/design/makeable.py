@@ -16,11 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PositiveFloat
 
-from ...core.errors import InputError
-from ...core.magnet import Magnet
 from ...core.specimen import Section, Specimen
 from ...core.toml import FileModel
-from ...sim import Designs, MagnetField, UniformField
+from ...sim import Designs
 from ...sim import Field as LoadField
 from ..shapes.feasible import falling_moduli, fitting_lengths
 
@@ -167,18 +165,14 @@ def rods(makeable: Makeable, candidates: Candidates) -> dict[str, Array]:
 def designs_in(rods_: dict[str, Array], field: LoadField) -> Designs:
     """Return rods in a field, ready to be solved together."""
     n = len(rods_["side_mm"])
-    flux, angle, gap = None, np.full(n, 90.0), None
-    magnet: Magnet | None = None
-    if isinstance(field, UniformField):
-        flux, angle = np.full(n, field.flux_mT), np.full(n, field.angle_deg)
-    elif isinstance(field, MagnetField):
-        magnet, gap = field.magnet, np.full(n, field.gap_mm)
-    else:
-        raise InputError("field must be a UniformField or a MagnetField")
+    uniform = field.uniform
+    flux, angle = None, np.full(n, 90.0)
+    if uniform is not None:
+        flux, angle = np.full(n, uniform.flux_mT), np.full(n, uniform.angle_deg)
     return Designs(
         length_mm=rods_["length_mm"], E_MPa=rods_["E_MPa"], side_mm=rods_["side_mm"],
         remanence_mT=rods_["remanence_mT"], flux_mT=flux, angle_deg=angle,
-        magnet=magnet, gap_mm=gap,
+        magnet=field if uniform is None else None,
     )  # fmt: skip
 
 

@@ -7,13 +7,13 @@ from pathlib import Path
 from ...core.errors import InputError
 from ...core.magnet import Magnet
 from ...core.table import read_table
-from ...sim import MagnetField, UniformField
+from ...sim import Field, UniformField, before
 from .goals import read_points, tip_goal
 from .search import Task
 
 
 def read_path(
-    path: Path, *, angle_deg: float = 90.0, magnet: Magnet | None = None
+    path: Path, *, angle_deg: float = 90.0, magnet: Magnet | Field | None = None
 ) -> list[Task]:
     """Return the goals of a table with ``flux_mT`` or ``gap_mm``, ``x_mm``, ``y_mm``.
 
@@ -23,8 +23,8 @@ def read_path(
         One row a field and the tip that is wanted in it.
     angle_deg : float
         Direction of uniform fields.
-    magnet : Magnet, optional
-        Before which the gaps are.
+    magnet : Magnet or Field, optional
+        Of sources that wait for the gaps.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def read_path(
     if not by_gap and not all(first):
         raise InputError(f"{path}: flux_mT must not be zero: no rod bends without")
     fields = [
-        MagnetField(magnet=magnet, gap_mm=float(value))
+        before(magnet).at_gap(float(value))
         if magnet is not None
         else UniformField(flux_mT=float(value), angle_deg=angle_deg)
         for value in first

@@ -24,7 +24,7 @@ from ...core.errors import InputError, SolverError
 from ...core.notebook import Tabular, axes_or_new
 from ...core.specimen import Specimen
 from ...core.specimen_file import specimen_dict
-from ...sim import Field, UniformField, solve, solve_shapes
+from ...sim import Field, solve, solve_shapes
 from ..library.space import sobol_points
 from . import goals
 from .goals import Goal
@@ -140,7 +140,8 @@ def find_designs(
     Parameters
     ----------
     goal : Goal
-    field : UniformField or MagnetField
+    field : Field
+        Uniform, or of any sources within the plane.
     makeable : Makeable
     count : int
     seed : int
@@ -463,12 +464,13 @@ def as_dict(found: Design, goal: Goal) -> dict[str, object]:
 
 
 def _refuse_field_along(goal: Goal, field: Field) -> None:
-    if goal.kind not in ("radius", "angle") or not isinstance(field, UniformField):
+    uniform = field.uniform
+    if goal.kind not in ("radius", "angle") or uniform is None:
         return
-    if abs(math.sin(math.radians(field.angle_deg))) < 1e-9:
+    if abs(math.sin(math.radians(uniform.angle_deg))) < 1e-9:
         raise InputError(
-            f"a field at {field.angle_deg:g} deg runs along the rod and does not bend "
-            f"it, so none gets {goal.words}; give a field across it, such as 90 deg"
+            f"a field at {uniform.angle_deg:g} deg runs along the rod and does not "
+            f"bend it, so none gets {goal.words}; give a field across it, at 90 deg"
         )
 
 

@@ -10,7 +10,7 @@ from ...core.checks import positive, shown, within
 from ...core.errors import InputError
 from ...core.magnet import Magnet
 from ...core.sources import FLUX_LIMIT_T
-from ..fields import Field
+from ..fields import Field, before
 
 COLUMNS = {
     "side_mm": (1e-9, 1e9, "mm"),
@@ -56,16 +56,15 @@ def check_magnet(magnet: object) -> None:
         If it is either.
     """
     if isinstance(magnet, Field):
-        if not magnet.in_plane or not magnet.follows_gap:
+        if not magnet.in_plane:
             raise InputError(
-                "magnet of batches must be a field within the plane z = 0, of which a "
-                "source has neither centre_mm nor gap_mm in mm; instead received "
-                f"{shown(magnet)}"
+                "magnet of batches must be a field within the plane z = 0, with "
+                f"elevation_deg and z in mm of 0; instead received {shown(magnet)}"
             )
         return
     if not isinstance(magnet, Magnet):
         raise InputError(
-            "magnet must be a Magnet or a Field of sources for gap_mm; instead "
+            "magnet must be a Magnet in mm and T, or a Field of sources; instead "
             f"received {shown(magnet)}"
         )
     if magnet.elevation_deg != 0.0 or magnet.offset_mm[2] != 0.0:
@@ -79,3 +78,8 @@ def check_magnet(magnet: object) -> None:
             f"magnet remanence_T must be within {FLUX_LIMIT_T:g} T; instead received "
             f"{magnet.remanence_T!r}"
         )
+
+
+def waits_for_gap(magnet: Magnet | Field | None) -> bool:
+    """Tell whether designs before a magnet have a column gap_mm."""
+    return magnet is not None and before(magnet).follows_gap

@@ -16,7 +16,7 @@ from ...core.checks import finite, shown, store, whole
 from ...core.errors import InputError
 from ...core.magnet import Magnet
 from ...core.specimen import Specimen
-from ..fields import Field, before
+from ..fields import Field, before, outside
 from ..planar.solver import GONE, OK_UNSTABLE, TOUCHES, solve_planar_rows
 from ..scaling import (
     MOST_POINTS,
@@ -24,12 +24,14 @@ from ..scaling import (
     many_rods,
     uniform_rows,
 )
-from .columns import COLUMNS, check_magnet, column
+from .columns import COLUMNS, check_magnet, column, waits_for_gap
 from .threads import in_threads
 
 Array = NDArray[np.float64]
 
-STATUS = ("stable", "unstable", "pulled in: no equilibrium", "not solved")
+STATUS = (
+    "stable", "unstable", "pulled in: no equilibrium", "not solved", "leaves the map"
+)  # fmt: skip
 """Meaning of the codes in `Shapes.status`."""
 
 ORDER = 10
@@ -56,7 +58,7 @@ class Designs:
         Direction of the uniform field; not used before a magnet.
     magnet : Magnet, Field or None
     gap_mm : ndarray, shape (n,), or None
-        Gap of the magnet.
+        Gap of the magnet; None before sources that all have their place.
 
     Raises
     ------
@@ -75,13 +77,18 @@ class Designs:
     gap_mm: Array | None = None
 
     def __post_init__(self) -> None:
-        if (self.flux_mT is None) == (self.magnet is None or self.gap_mm is None):
+        if self.magnet is not None:
+            check_magnet(self.magnet)
+        if (self.flux_mT is None) == (self.magnet is None):
             raise InputError(
                 "designs must have either flux_mT in mT, or a magnet and gap_mm in mm; "
                 f"instead received {'both' if self.flux_mT is not None else 'neither'}"
             )
-        if self.magnet is not None:
-            check_magnet(self.magnet)
+        if waits_for_gap(self.magnet) != (self.gap_mm is not None):
+            raise InputError(
+                "designs must have gap_mm in mm exactly where a source of their magnet "
+                f"waits for it; instead received {shown(self.gap_mm)}"
+            )
         columns = {
             name: column(name, values)
             for name in _OWN
@@ -202,7 +209,7 @@ def solve_shapes(
     if by_section:
         stations = _section_stations(rods[:, ::-1, 0], points)
     stations = np.broadcast_to(stations, (n, points))
-    if designs.magnet is not None and designs.gap_mm is not None:
+    if designs.magnet is not None:
         fields = field_rows(before(designs.magnet), designs.gap_mm, total_mm)
     elif designs.flux_mT is not None:
         fields = uniform_rows(designs.flux_mT * 1e-3, designs.angle_deg)
@@ -214,6 +221,11 @@ def solve_shapes(
         )  # fmt: skip
 
     in_threads(work, n, ROWS_PER_CALL)
+    if isinstance(designs.magnet, Field):
+        curves = out[:, :, 1:3].transpose(0, 2, 1)
+        left = (status <= OK_UNSTABLE) & outside(designs.magnet, curves, np.ones(n))
+        out[left] = error[left] = np.nan
+        status[left] = STATUS.index("leaves the map")
     return Shapes(points=out, status=status, error_mm=error)
 
 

@@ -19,19 +19,21 @@ from ...core.errors import InputError
 from ...core.jit import plain_first
 from ...core.magnet import Magnet
 from ...core.progress import Progress, silent
-from ..fields import PULLED_IN, STABLE, UNSTABLE, Field, before
+from ..fields import PULLED_IN, STABLE, UNSTABLE, Field, before, outside
 from ..magnet.field import magnet_block
 from ..planar.solver import OK_UNSTABLE, TOUCHES, solve_planar_rows
 from ..scaling import direction, field_rows, many_rods, uniform_rows
-from .columns import COLUMNS, check_magnet, column
+from .columns import COLUMNS, check_magnet, column, waits_for_gap
 from .lanes import HARD, solve_lanes
 from .threads import in_threads
 
 Array = NDArray[np.float64]
 
-OUTCOMES = (STABLE, UNSTABLE, PULLED_IN, "not solved", "touches the magnet")
+OUTCOMES = (
+    STABLE, UNSTABLE, PULLED_IN, "not solved", "touches the magnet", "leaves the map"
+)  # fmt: skip
 """Meaning of the codes in the column ``outcome``."""
-NOT_SOLVED = 3
+NOT_SOLVED, TOUCHING, LEAVING = 3, 4, 5
 RESULT = np.dtype(
     [
         ("tip_x_mm", np.float64),
@@ -78,10 +80,11 @@ def solve_many(
         ``length_mm`` and ``E_MPa``, shape (n, sections) or (sections,), root first;
         ``remanence_mT`` and the sizes of one shape (``side_mm``; ``width_mm`` in the
         plane and ``height_mm``; ``diameter_mm``, also with ``bore_mm``), shape
-        (n, sections), (n,) or scalar; and either ``flux_mT`` and ``angle_deg`` (90 by
-        default), or ``gap_mm``, shape (n,) or scalar.
-    magnet : Magnet, optional
-        The magnet to which ``gap_mm`` refers; in the plane of the rods.
+        (n, sections), (n,) or scalar; and without a magnet ``flux_mT`` and
+        ``angle_deg`` (90 by default), with one ``gap_mm``, shape (n,) or scalar, unless
+        every source of it has its place.
+    magnet : Magnet or Field, optional
+        What the rods stand before, in their plane.
     progress : callable
         Called as ``progress(done, total)``, from this thread.
     stop : callable, optional
@@ -132,7 +135,7 @@ def _columns(
     """Return the columns, checked: those of sections (n, k), the others (n,)."""
     if magnet is not None:
         check_magnet(magnet)
-    arrays = _given(designs, before_magnet=magnet is not None)
+    arrays = _given(designs, magnet)
     n = max((len(a) for k, a in arrays.items() if a.ndim > (k in _WIDE)), default=1)
     if arrays["length_mm"].ndim == 0 or arrays["length_mm"].shape[-1] == 0:
         raise InputError(
@@ -161,7 +164,7 @@ def _columns(
 
 
 def _given(
-    designs: Mapping[str, ArrayLike] | NDArray[np.void], *, before_magnet: bool
+    designs: Mapping[str, ArrayLike] | NDArray[np.void], magnet: Magnet | Field | None
 ) -> dict[str, Array]:
     """Return the columns as they are given, their names and values checked."""
     given = designs.dtype.names if isinstance(designs, np.ndarray) else designs
@@ -180,16 +183,19 @@ def _given(
             f"{', '.join(sorted(sizes))}"
         )
     wanted = {"length_mm", "E_MPa", "remanence_mT"} | sizes
-    wanted |= {"gap_mm"} if before_magnet else {"flux_mT"}
-    known = wanted if before_magnet else wanted | {"angle_deg"}
+    if magnet is None:
+        wanted |= {"flux_mT"}
+    elif waits_for_gap(magnet):
+        wanted |= {"gap_mm"}
+    known = wanted | {"angle_deg"} if magnet is None else wanted
     if not wanted <= set(names) <= known:
         raise InputError(
             f"designs must have the columns {', '.join(sorted(wanted))} in mm, MPa and "
-            f"mT (gap_mm with a magnet, flux_mT without); instead received "
-            f"{', '.join(sorted(names))[:200]}"
+            f"mT (flux_mT without a magnet, gap_mm if it waits for one); instead "
+            f"received {', '.join(sorted(names))[:200]}"
         )
     arrays = {name: column(name, designs[name]) for name in names}
-    if not before_magnet:
+    if magnet is None:
         arrays.setdefault("angle_deg", np.array(90.0))
     return arrays
 
@@ -223,9 +229,9 @@ def _solve_chunk(
         if magnet is None:
             fields = uniform_rows(flux_T[hard], columns["angle_deg"][hard])
         else:
-            gap_mm = columns["gap_mm"][hard]
+            gap_mm = columns["gap_mm"][hard] if "gap_mm" in columns else None
             fields = field_rows(before(magnet), gap_mm, total_mm[hard])
-        found = _solve_hard(rods[hard], fields, margins[hard])
+        found = _solve_hard(rods[hard], fields, margins[hard], magnet, total_mm[hard])
         tips[hard], outcome[hard], index[hard] = found
     out["tip_x_mm"] = tips[:, 0] * total_mm
     out["tip_y_mm"] = tips[:, 1] * total_mm
@@ -236,7 +242,11 @@ def _solve_chunk(
 
 
 def _solve_hard(
-    rods: Array, fields: Array, margins: Array
+    rods: Array,
+    fields: Array,
+    margins: Array,
+    magnet: Magnet | Field | None,
+    total_mm: Array,
 ) -> tuple[Array, Array, Array]:
     """Solve the designs that left the lanes: tips and errors, outcomes, indices."""
     stations = np.linspace(0.0, 1.0, 41)[None]
@@ -245,9 +255,12 @@ def _solve_hard(
     )
     outcome, index = found[:, 0], found[:, 1]
     tips = np.column_stack([curves[:, :3, -1], found[:, 2]])
-    gone = outcome > OK_UNSTABLE
-    touching = outcome == TOUCHES
-    outcome = np.where(touching, 4, np.minimum(outcome, NOT_SOLVED))
+    touching, gone = outcome == TOUCHES, outcome > OK_UNSTABLE
+    outcome = np.where(touching, TOUCHING, np.minimum(outcome, NOT_SOLVED))
+    if isinstance(magnet, Field):
+        left = ~gone & outside(magnet, curves[:, :2], total_mm)
+        outcome[left] = LEAVING
+        gone |= left
     tips[gone] = np.nan
     index[gone] = -1
     return tips, outcome, index

@@ -10,7 +10,8 @@ that come near enough to the place Newton's method goes on in the true field.
 What is found is checked by a count: as long as the energy falls nowhere without bound,
 the sum of (-1)^index over all equilibria is 1 (Poincare and Hopf). Where it is not, the
 grid is refined once. Before a magnet that a rod can touch the count need not close:
-what is lost then are rods that lean on the magnet.
+what is lost then are rods that lean on the magnet; nor in a map, of which those that
+leave its box are left out.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from ...core.centreline import Centreline
 from ...core.errors import InputError
 from ...core.specimen import Specimen
 from ...core.units import rad_from_deg
-from ..fields import Field, Support, UniformField
+from ..fields import Field, Support, UniformField, outside
 from ..magnet.flux import distance_at
 from ..planar.march import M
 from ..planar.near import settle
@@ -90,7 +91,7 @@ def _scan(
             if distance_at(array, x, y, 0.0) <= margin:
                 continue
             for u in _dead_load_tips(specimen, field, support, x, y, NEAR * 2.0 / grid):
-                _keep(specimen, array, support, margin, u, points, seen, found)
+                _keep(specimen, field, support, u, points, seen, found)
     return found
 
 
@@ -118,9 +119,8 @@ def _dead_load_tips(
 
 def _keep(
     specimen: Specimen,
-    array: Array,
+    field: Field,
     support: Support,
-    margin: float,
     u: Array,
     points: int,
     seen: list[Array],
@@ -128,12 +128,15 @@ def _keep(
 ) -> None:
     """Go on from `u` in the true field, and keep what is new."""
     L = specimen.length_mm
+    array, margin = field_array(field, L), 0.5 * max(specimen.sides_mm) / L
     clamp = rad_from_deg(support.clamp_angle_deg)
     rod, s, out = rod_array(specimen, support), stations(points), np.empty((4, points))
     index = settle(rod, array, clamp, margin, s, ORDER, STEP, u, out)
     if index < 0:
         return
     x, y, theta, kappa = out
+    if outside(field, out[None, :2], np.array([L]))[0]:
+        return
     place = np.array([theta[-1], x[-1], y[-1]])
     if any(np.max(np.abs(place - other)) < SAME for other in seen):
         return

@@ -122,12 +122,12 @@ class FieldMap:
         """No: its points are given."""
         return False
 
-    def holds(self, points_mm: Array) -> bool:
-        """Tell whether all points, shape (n, 3), lie in the box (or flat box)."""
+    def holds(self, points_mm: Array) -> NDArray[np.bool_]:
+        """Tell of rods, shape (..., n, 3), which lie in the box (or flat box)."""
         slack = EDGE * float(np.max(self.high_mm - self.low_mm))
         low, high = self.low_mm - slack, self.high_mm + slack
         inside = (points_mm >= low) & (points_mm <= high)
-        return bool(np.all(inside))
+        return np.asarray(np.all(inside, axis=(-2, -1)))
 
 
 def sampled_map(

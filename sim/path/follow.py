@@ -34,6 +34,7 @@ from ..fields import (
     as_field,
     check_case,
     check_plain,
+    refuse_outside,
 )
 from ..one_rod import solve
 from ..planar.near import LOST, TOUCHING, settle
@@ -280,6 +281,7 @@ class _Walk:
             )
         L = specimen.length_mm
         x, y, theta, kappa = out
+        refuse_outside(field, x, y, L)
         line = Centreline._trusted(self.s * L, x * L, y * L, theta, kappa / L)
         return PathPoint(
             value=value, status=STABLE if self.index == 0 else UNSTABLE,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -28,6 +27,7 @@ from ..fields import Field
 from ..magnet import flux
 from ..magnet.flux import FIRST, WIDTH
 from ..magnet.map import FieldMap
+from .overlap import refuse_overlap
 from .rods import array_cache
 
 Array = NDArray[np.float64]
@@ -77,8 +77,6 @@ def field_array(field: Field, length_mm: float) -> Array:
             f"sources; instead received {shown(field)}"
         )
     row: Array = field_rows(field, None, np.array([length_mm]))[0]
-    if len(field.sources) > 1:
-        _refuse_overlap(field, row, length_mm)
     return row
 
 
@@ -104,7 +102,7 @@ def field_rows(field: Field, gap_mm: Array | None, length_mm: Array) -> Array:
     Raises
     ------
     InputError
-        If a source waits for a gap and none is given.
+        If a source waits for a gap and none is given, or two sources overlap.
     """
     template = _template(field)
     if template.waits and gap_mm is None:
@@ -118,7 +116,9 @@ def field_rows(field: Field, gap_mm: Array | None, length_mm: Array) -> Array:
         rows = rows + gap_mm[:, None] * template.gap
     moved = template.power != 0.0
     rows[:, moved] /= L ** template.power[moved]
-    return np.ascontiguousarray(rows)
+    rows = np.ascontiguousarray(rows)
+    refuse_overlap(field.sources, rows, length_mm)
+    return rows
 
 
 @lru_cache(maxsize=256)
@@ -232,40 +232,3 @@ _KINDS: dict[type, tuple[float, Callable[[Any, Array, Array], None]]] = {
     Gradient: (flux.GRADIENT, _gradient),
     FieldMap: (flux.CHARGES, _map),
 }
-
-
-def _refuse_overlap(field: Field, row: Array, length_mm: float) -> None:
-    """Refuse bodies that stand in each other, as points in one show in the other."""
-    steps = np.linspace(-0.999, 0.999, 9)
-    cube = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
-    bodies = [
-        (i, source, row[FIRST + WIDTH * i : FIRST + WIDTH * (i + 1)])
-        for i, source in enumerate(field.sources)
-        if isinstance(source, (Cuboid, Cylinder, Dipole))
-    ]
-    for (i, one, a), (j, other, b) in combinations(bodies, 2):
-        for body, size in ((a, one), (b, other)):
-            half = np.full(3, body[1]) if isinstance(size, Dipole) else body[1:4]
-            points = body[4:7] + (cube * half) @ body[7:16].reshape(3, 3)
-            shared = _within(a, points) & _within(b, points)
-            if np.any(shared):
-                x_mm, y_mm, z_mm = points[np.argmax(shared)] * length_mm
-                raise InputError(
-                    f"sources {i} ({one.kind}) and {j} ({other.kind}) of a field must "
-                    "not overlap; instead received two that share the point "
-                    f"({x_mm:.4g}, {y_mm:.4g}, {z_mm:.4g}) mm: move centre_mm, gap_mm "
-                    "or offset_mm"
-                )
-
-
-def _within(body: Array, points: Array) -> NDArray[np.bool_]:
-    """Tell of points whether they are in a body."""
-    p = (points - body[4:7]) @ body[7:16].reshape(3, 3).T
-    across: Array = np.hypot(p[:, 0], p[:, 1])
-    if body[0] == flux.DIPOLE:
-        inside: NDArray[np.bool_] = np.hypot(across, p[:, 2]) <= body[1]
-    elif body[0] == flux.CYLINDER:
-        inside = (across <= body[1]) & (np.abs(p[:, 2]) <= body[3])
-    else:
-        inside = np.all(np.abs(p) <= body[1:4], axis=1)
-    return inside

@@ -11,8 +11,10 @@ import pytest
 from magbend.core.errors import InputError
 from magbend.core.magnet import Magnet
 from magbend.core.specimen import Section, Specimen
+from magbend.core.units import MU0
 from magbend.sim import (
     MagnetField,
+    Rod,
     Support,
     UniformField,
     find_equilibria,
@@ -170,3 +172,22 @@ def test_a_rod_of_500_sections_is_solved() -> None:
         np.testing.assert_allclose(
             one.centreline.tip_mm, solve(whole, field).centreline.tip_mm, atol=1e-9
         )
+
+
+@pytest.mark.parametrize(
+    ("height_mm", "holds"), [(0.5, False), (0.9, False), (1.1, True), (2.0, True)]
+)
+def test_a_strip_leaves_the_plane_over_its_weaker_side(
+    height_mm: float, holds: bool
+) -> None:
+    # Against the field a column buckles at m B L^2 = EI pi^2 / 4 of either side; here
+    # the field is just below what it takes within the plane.
+    strip = Rod(
+        name="strip", shape="rectangle", width_mm=1.0, height_mm=height_mm,
+        remanence_mT=20.0, sections=(Section(length_mm=30.0, E_MPa=10.0),),
+    )  # fmt: skip
+    moment_Am = height_mm * 20.0e-9 / MU0
+    euler_T = 10.0 * height_mm / 12.0 * math.pi**2 / 4.0 / 900.0 / moment_Am
+    found = solve(strip, UniformField(flux_mT=0.95e3 * euler_T, angle_deg=180.0))
+    assert found.status == "stable"
+    assert found.stable_in_space is holds
