@@ -133,7 +133,7 @@ def morse_index(rod, field, load, n, R, r):  # type: ignore[no-untyped-def]
     """Count the focal points between tip and root: the unstable directions."""
     m = unknowns(field)
     y, Z = np.zeros(STATE), np.zeros((COLUMN, 2 * m))
-    K, KZ, ys, Zs, b, b2, p = workspace(2 * m)
+    K, KZ, ys, Zs, b, b2, p = workspace(2 * m, rod.shape[1])
     begin(rod, field, load, R, r, y, Z, b)
     X0, X1, B, S = (
         np.zeros((m, m)), np.zeros((m, m)), np.zeros((m, m)), np.zeros((m, m)),

@@ -17,8 +17,9 @@ A column, shape (12,), holds (chi, dm, dr, dn): dR = R chi^, and the variations 
 and n. Six of them, for a turn and a shift of the tip, give Newton's matrix; in a
 uniform field three, for the turn.
 
-A section is a row of 13 numbers, named below. One step of the sixth-order method of
-Butcher (J. Austral. Math. Soc. 4, 179, 1964) has seven stages.
+A section is a row of 13 numbers, named below; a wider one goes on with a solid's law
+(`law`). One step of the sixth-order method of Butcher (J. Austral. Math. Soc. 4, 179,
+1964) has seven stages.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ import numpy as np
 
 from ...core.jit import njit
 from ..magnet.flux import flux_at, is_uniform
+from .law import face_load, solid_slope
 
 H, C1, C2, C3, AXIAL, MU1, MU2, K1, K2, K3, WX, WY, WZ = range(13)
 WIDTH = 13
@@ -173,6 +175,9 @@ def step(h, p, field, y, Z, K, KZ, ys, Zs, b, b2):  # type: ignore[no-untyped-de
                     ys[i] += c * K[j, i]
                 for i in range(z.shape[0]):
                     zs[i] += c * kz[j, i]
+        if p.shape[0] > WIDTH:
+            solid_slope(p, ys, K[stage], Zs, KZ[stage])
+            continue
         _slope(p, field, ys, K[stage], b)
         if z.shape[0] > 0:
             _column_slope(p, field, ys, b, Zs, KZ[stage], b2)
@@ -188,14 +193,16 @@ def step(h, p, field, y, Z, K, KZ, ys, Zs, b, b2):  # type: ignore[no-untyped-de
 @njit(cache=True)
 def begin(rod, field, load, R, r, y, Z, b):  # type: ignore[no-untyped-def]
     """Set state and columns at a tip with rotation R (3, 3) and position r (3,)."""
-    flux_at(field, r[0], r[1], r[2], b)
     m = load * rod[0, AXIAL]
+    solid = rod.shape[1] > WIDTH
+    if not solid:
+        flux_at(field, r[0], r[1], r[2], b)
     y[9:12] = 0.0
     for i in range(3):
         for a in range(3):
             y[3 * i + a] = R[i, a]
         y[12 + i] = r[i]
-        y[15 + i] = m * b[i]
+        y[15 + i] = 0.0 if solid else m * b[i]
     if Z.shape[1] > 0:
         Z[:] = 0.0
         for a in range(3):
@@ -203,7 +210,9 @@ def begin(rod, field, load, R, r, y, Z, b):  # type: ignore[no-untyped-def]
             if Z.shape[1] > 3:
                 Z[6 + a, 3 + a] = 1.0
                 for i in range(3):
-                    Z[9 + i, 3 + a] = m * b[3 + 3 * i + a]
+                    Z[9 + i, 3 + a] = 0.0 if solid else m * b[3 + 3 * i + a]
+    if solid:
+        face_load(field, m, rod[0], y, Z, b)
 
 
 @njit(cache=True)
@@ -250,8 +259,8 @@ def march(rod, field, load, n, R, r, y, Z, work):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True)
-def workspace(columns):  # type: ignore[no-untyped-def]
-    """Return what `march` and `step` work in."""
+def workspace(columns, width):  # type: ignore[no-untyped-def]
+    """Return what `march` and `step` work in, for rods of that many numbers a row."""
     return (
         np.zeros((7, STATE)),
         np.zeros((7, COLUMN, columns)),
@@ -259,5 +268,5 @@ def workspace(columns):  # type: ignore[no-untyped-def]
         np.zeros((COLUMN, columns)),
         np.zeros(12),
         np.zeros(12),
-        np.zeros(WIDTH),
+        np.zeros(width),
     )

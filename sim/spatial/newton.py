@@ -193,7 +193,7 @@ def solve_pose(rod, field, n, Rc, R, r):  # type: ignore[no-untyped-def]
     """
     columns = unknowns(field)
     y, Z, none = np.zeros(STATE), np.zeros((COLUMN, columns)), np.zeros((COLUMN, 0))
-    work, bare = workspace(columns), workspace(0)
+    work, bare = workspace(columns, rod.shape[1]), workspace(0, rod.shape[1])
     J, x = np.zeros((6, 6)), np.zeros((6, 1))
     _unloaded(rod, field, n, Rc, R, r, y, none, bare)
     R0, r0 = R.copy(), r.copy()
@@ -218,7 +218,7 @@ def solve_pose(rod, field, n, Rc, R, r):  # type: ignore[no-untyped-def]
 def shape(rod, field, n, R, r, s, out):  # type: ignore[no-untyped-def]
     """Fill `out` (m, 18) with the state at the ascending stations `s`, root to tip."""
     y, Z = np.zeros(STATE), np.zeros((COLUMN, 0))
-    K, KZ, ys, Zs, b, b2, p = workspace(0)
+    K, KZ, ys, Zs, b, b2, p = workspace(0, rod.shape[1])
     begin(rod, field, 1.0, R, r, y, Z, b)
     k = s.shape[0] - 1
     here = 0.0
