@@ -19,6 +19,7 @@ from magbend.vision.synthetic import (
     PAPER,
     RUBBER,
     Block,
+    Label,
     Mark,
     Rod,
     Scene,
@@ -60,8 +61,8 @@ class Case:
         return self.scene.clamp.pose.height_mm
 
 
-def draw_case(seed: int, index: int) -> Case:
-    """Draw a scene: the same for the same seed and index."""
+def draw_case(seed: int, index: int, label: Label | None = None) -> Case:
+    """Draw a scene: the same for the same seed and index, with a tag on its clamp."""
     kind = KINDS[index % len(KINDS)]
     rng = np.random.default_rng([seed, index])
     while True:
@@ -82,11 +83,21 @@ def draw_case(seed: int, index: int) -> Case:
         scene, words = _blurred(rng, scene)
     elif kind == "mixed":
         scene, words = _mixed(rng, scene, camera)
+    if label is not None:
+        scene = replace(scene, clamp=_labelled(scene.clamp, label))
     picture = render_scene(scene, camera, rng)
     quality = int(rng.choice([80, 90, 95, 100]))
     _, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, quality])
     photo = as_photo(cv2.imdecode(data, cv2.IMREAD_COLOR), source=f"{kind}_{index:03}")
     return Case(kind=kind, words=words, photo=photo, camera=camera, scene=scene)
+
+
+def _labelled(clamp: Block, label: Label) -> Block:
+    """Return a clamp with a tag on its top, wide enough for it."""
+    tag = replace(label.tag, height_mm=clamp.height_mm)
+    wide = max(clamp.width_mm, 11.0)
+    label = replace(label, tag=tag)
+    return replace(clamp, width_mm=wide, screws_mm=(), label=label)
 
 
 def _camera(rng: np.random.Generator, *, telephone: bool) -> Calibration:

@@ -2,153 +2,29 @@
 
 from __future__ import annotations
 
-import json
 import math
-import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
 
 from ..core.errors import InputError
-from . import vision_points
-from .console import JSON, group, print_json, progress, say
-from .vision_show import (
-    calibration_facts,
-    tell_calibration,
-    tell_frames,
-    tell_ringing,
-)
+from . import vision_camera, vision_points
+from .console import JSON, group, print_json, progress
+from .vision_camera import LINEAR
+from .vision_setting import setting_of, specimen_of
+from .vision_show import tell_frames, tell_ringing
 
 if TYPE_CHECKING:
-    from ..core import Specimen
-    from ..vision import Board, Calibration, Setting
+    from ..vision import Setting
 
 app = group(
     "vision",
     "Photographs to calibrated centrelines in mm.",
     "magbend vision extract photo.png --calibration calibration.json --out measured",
 )
+vision_camera.register(app)
 vision_points.register(app)
-
-LINEAR = typer.Option(
-    None, "--linear/--no-linear",
-    help="Values of the files are proportional to light; default: the curve of sRGB.",
-)  # fmt: skip
-_BOARD = typer.Option("7x5", "--board", help="Squares across and down.")
-_SQUARE = typer.Option(10.0, "--square-mm", help="Side of a square, as designed.")
-_MARKER = typer.Option(7.5, "--marker-mm", help="Side of a marker, as designed.")
-_DICTIONARY = typer.Option("DICT_4X4_50", "--dictionary", help="OpenCV's name of it.")
-
-
-@app.command(epilog="Example: magbend vision board --out board.pdf")
-def board(
-    out: Path = typer.Option(..., "--out", help="The file: .pdf or .png."),
-    squares: str = _BOARD,
-    square_mm: float = _SQUARE,
-    marker_mm: float = _MARKER,
-    dictionary: str = _DICTIONARY,
-    dpi: int = typer.Option(600, "--dpi", help="Resolution of a .png."),
-) -> None:
-    """Write the ChArUco board to print."""
-    from ..core.files import output_file
-    from ..vision import Board, write_board
-
-    columns, rows = _two_numbers(squares, "--board")
-    output_file(out)
-    design = Board(
-        columns=columns,
-        rows=rows,
-        square_mm=square_mm,
-        marker_mm=marker_mm,
-        dictionary=dictionary,
-    )
-    write_board(design, out, dpi=dpi)
-    width, height = design.size_mm
-    say(
-        f"{out}: {design.describe().split(', printed')[0]}; {width:g} x {height:g} mm. "
-        "Print at 100 %, then measure it with a calliper for --print-scale."
-    )
-
-
-@app.command(
-    epilog="Example: magbend vision calibrate plane.png tilted1.png tilted2.png "
-    "--out calibration.json --rod-height-mm 0.9"
-)
-def calibrate(
-    plane: Path = typer.Argument(..., help="The board in the measuring plane."),
-    lens: list[Path] = typer.Argument(
-        None, help="The board tilted in different ways, for the lens."
-    ),
-    out: Path = typer.Option(..., "--out", help="The calibration file (JSON)."),
-    squares: str = _BOARD,
-    square_mm: float = _SQUARE,
-    marker_mm: float = _MARKER,
-    dictionary: str = _DICTIONARY,
-    chessboard: str = typer.Option(
-        None, "--chessboard", help="A plain chessboard: inner corners, such as 9x6."
-    ),
-    legacy: bool = typer.Option(
-        False, "--legacy-pattern", help="A board with even rows made before OpenCV 4.6."
-    ),
-    print_scale: float = typer.Option(
-        1.0, "--print-scale", help="Measured over nominal length of the print."
-    ),
-    rod_height_mm: float = typer.Option(
-        0.0, "--rod-height-mm", help="Height of the rod's axis above the board's plane."
-    ),
-    camera_height_mm: float = typer.Option(
-        None, "--camera-height-mm", help="Lens to plane, if you measured it (2 %)."
-    ),
-    focal_px: float = typer.Option(
-        None, "--focal-px", help="Focal length in pixels, if you know it."
-    ),
-    known_length: str = typer.Option(
-        None, "--known-length",
-        help="No board: 'X1,Y1 X2,Y2 MM', two pixels and the length between them.",
-    ),
-    scale_mm_per_px: float = typer.Option(
-        None, "--scale-mm-per-px", help="No board: the scale itself."
-    ),
-    linear: bool = LINEAR,
-    json_output: bool = JSON,
-) -> None:  # fmt: skip
-    """Calibrate a camera from photographs of the board."""
-    from ..core.derived import note_derived
-    from ..core.files import output_file
-    from ..vision import calibrate as calibrate_photos
-    from ..vision import read_photo, write_calibration
-
-    output_file(out)
-    if known_length or scale_mm_per_px is not None:
-        if known_length and scale_mm_per_px is not None:
-            raise typer.BadParameter("give --known-length or --scale-mm-per-px")
-        result = _without_board(
-            plane, known_length, scale_mm_per_px, camera_height_mm, rod_height_mm
-        )
-    else:
-        columns, rows = _two_numbers(
-            chessboard or squares, "--chessboard" if chessboard else "--board"
-        )
-        design = _design(
-            columns, rows, square_mm, marker_mm, dictionary, print_scale,
-            legacy=legacy, plain=bool(chessboard),
-        )  # fmt: skip
-        result = calibrate_photos(
-            read_photo(plane, linear=linear),
-            [read_photo(path, linear=linear) for path in lens or []],
-            board=design,
-            rod_height_mm=rod_height_mm,
-            camera_height_mm=camera_height_mm,
-            focal_px=focal_px,
-        )
-    write_calibration(result, out)
-    note_derived([out], sources=[plane, *(lens or [])], command="vision calibrate")
-    facts = calibration_facts(result)
-    if json_output:
-        print_json({"calibration": str(out), **facts})
-        return
-    tell_calibration(result, facts, out)
 
 
 @app.command(
@@ -241,7 +117,7 @@ def extract(
         own = run / "calibration.json"
         calibration = own if own.exists() else None
     folder = out or run or Path("measured")
-    setting = _setting(
+    setting = setting_of(
         calibration,
         bare,
         {
@@ -254,7 +130,7 @@ def extract(
         clamp="none" if free else "auto",
         linear=linear,
     )
-    rod = _specimen(specimen, run)
+    rod = specimen_of(specimen, run)
     if rod is not None:
         setting = with_specimen(setting, rod)
     _refuse_joints_beyond(setting, joints_mm)
@@ -316,8 +192,8 @@ def ring(
     from ..vision import ring_of_film, with_specimen
 
     positive(settle_mm, "--settle-mm", "mm")
-    setting = _setting(calibration, None, {"rod_height_mm": rod_height_mm})
-    if (rod := _specimen(specimen, None)) is not None:
+    setting = setting_of(calibration, None, {"rod_height_mm": rod_height_mm})
+    if (rod := specimen_of(specimen, None)) is not None:
         setting = with_specimen(setting, rod)
     with progress("frames") as report:
         found = ring_of_film(
@@ -327,15 +203,6 @@ def ring(
         print_json({"film": str(film), **asdict(found)})
     else:
         tell_ringing(found, settle_mm)
-
-
-def _two_numbers(text: str, option: str) -> tuple[int, int]:
-    match = re.fullmatch(r"\s*(\d{1,3})\s*[xX*]\s*(\d{1,3})\s*", text)
-    if match is None:
-        raise InputError(
-            f"{option} must be two numbers such as 7x5; instead received {text!r}"
-        )
-    return int(match.group(1)), int(match.group(2))
 
 
 def _numbers(text: str) -> tuple[float, ...]:
@@ -367,125 +234,10 @@ def _refuse_joints_beyond(setting: Setting, given: str) -> None:
         )
 
 
-def _design(
-    columns: int, rows: int, square_mm: float, marker_mm: float, dictionary: str,
-    print_scale: float, *, legacy: bool, plain: bool,
-) -> Board:  # fmt: skip
-    from ..vision import Board
-
-    return Board(
-        kind="chessboard" if plain else "charuco",
-        columns=columns,
-        rows=rows,
-        square_mm=square_mm,
-        marker_mm=marker_mm,
-        dictionary=dictionary,
-        print_scale=print_scale,
-        legacy=legacy,
-    )
-
-
-def _without_board(
-    plane: Path,
-    known_length: str | None,
-    scale_mm_per_px: float | None,
-    camera_height_mm: float | None,
-    rod_height_mm: float,
-) -> Calibration:
-    from ..core.checks import positive
-    from ..vision import calibrate_known_length, read_photo, scale_calibration
-
-    size_px = read_photo(plane).size_px
-    if scale_mm_per_px is not None:
-        return scale_calibration(
-            mm_per_px=positive(scale_mm_per_px, "--scale-mm-per-px", "mm/px"),
-            image_size_px=size_px,
-            camera_height_mm=camera_height_mm,
-            rod_height_mm=rod_height_mm,
-        )
-    try:
-        x1, y1, x2, y2, length_mm = (
-            float(part) for part in re.split(r"[,\s]+", (known_length or "").strip())
-        )
-    except ValueError:
-        raise InputError(
-            "--known-length must be 'X1,Y1 X2,Y2 MM', such as '120,300 1320,305 60'; "
-            f"instead received {known_length!r}"
-        ) from None
-    return calibrate_known_length(
-        size_px,
-        from_px=(x1, y1),
-        to_px=(x2, y2),
-        length_mm=length_mm,
-        camera_height_mm=camera_height_mm,
-        rod_height_mm=rod_height_mm,
-    )
-
-
 def _only_run(images: list[Path]) -> Path | None:
     if len(images) == 1 and (images[0] / "run.json").exists():
         return images[0]
     return None
-
-
-def _specimen(path: Path | None, run: Path | None) -> Specimen | None:
-    """Return the rod of a file, else of a run; None where neither tells."""
-    from ..core import read_specimen
-    from ..core.specimen_file import SpecimenModel
-
-    if path is not None:
-        return read_specimen(path)
-    if run is None:
-        return None
-    try:
-        record = json.loads((run / "run.json").read_text(encoding="utf-8"))
-        return SpecimenModel.model_validate(record["specimen"]).specimen()
-    except (OSError, ValueError, KeyError, TypeError, InputError):
-        return None  # the run says so itself, to whoever reads it as a run
-
-
-def _setting(
-    calibration: Path | None,
-    bare: Path | None,
-    lengths: dict[str, float | None],
-    **others: Any,
-) -> Setting:
-    from ..core.checks import finite, positive
-    from ..vision import Setting, read_bare, read_calibration
-
-    known = None if calibration is None else read_calibration(calibration)
-    given: dict[str, Any] = {
-        name: finite(value, f"--{name.replace('_', '-')}", "mm")
-        for name, value in lengths.items()
-        if value is not None
-    }
-    if "length_mm" in given:
-        positive(given["length_mm"], "--length-mm", "mm")
-    if known is not None:
-        height_mm = given.get("rod_height_mm", known.rod_height_mm)
-        _below_the_camera(height_mm, known.camera_height_mm)
-    return Setting(
-        calibration=known,
-        bare=None if bare is None else read_bare(bare, linear=others.get("linear")),
-        **given,
-        **others,
-    )
-
-
-def _below_the_camera(rod_height_mm: float, camera_height_mm: float) -> None:
-    """Refuse a rod that the camera could not see.
-
-    Raises
-    ------
-    InputError
-        If it is not between the board's plane, give or take a bench, and the lens.
-    """
-    if not abs(rod_height_mm) < camera_height_mm:
-        raise InputError(
-            "--rod-height-mm must be below the camera, which the calibration puts "
-            f"{camera_height_mm:.0f} mm above the board; instead received "
-            f"{rod_height_mm:g} mm"
-        )
 
 
 def _workers(pictures: int) -> int:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .console import print_json, say
 
 if TYPE_CHECKING:
-    from ..vision import BatchResult, Calibration, FrameRow, Ringing
+    from ..vision import BatchResult, Calibration, FrameRow, Ringing, TagPlace
 
 
 def calibration_facts(result: Calibration) -> dict[str, Any]:
@@ -63,6 +63,27 @@ def tell_calibration(result: Calibration, facts: dict[str, Any], out: Path) -> N
 
 
 _TOLD_ONCE = ("uncalibrated", "clamp_moved", "height_assumed")
+
+_EXPLAINED = {
+    "height_assumed": "nobody said how high the rod's axis lies above the board; 0 mm "
+    "is taken: give --rod-height-mm (half the rod's side, and what lies under it), 0 "
+    "if the board lay at its height",
+    "camera_moved": "the tag on the clamp is seen in another size than when it was "
+    "registered: the camera was moved or focused anew since; calibrate again",
+    "clamp_turned": "the tag on the clamp lies in another direction than when it was "
+    "registered: the camera or the clamp was turned since, or the pictures were",
+    "length_differs": "the rod is not as long there as in the other photographs of "
+    "its run: the camera was moved or tilted since it was calibrated, or the rod "
+    "slipped in its clamp",
+    "length_mismatch": "the rod is not as long as it should be: another rod, another "
+    "free length, a wrong --rod-height-mm, or a camera that was moved since it was "
+    "calibrated",
+    "tag_differs": "the tag and the rod itself tell different clamps: the tag came "
+    "loose, the rod was clamped anew, or the clamp's line is that of a shade",
+    "tag_not_seen": "the calibration knows a tag on the clamp, and it is not seen; "
+    "the rod itself tells place and direction",
+}
+"""Flags that a sentence helps with."""
 
 
 def _tell_clamps(frames: Sequence[FrameRow]) -> None:
@@ -120,13 +141,11 @@ def tell_frames(result: BatchResult, *, json_output: bool) -> None:
         elif doubts := [f for f in frame.flags if f not in _TOLD_ONCE]:
             say(f"{frame.image}: {', '.join(doubts)}", err=True)
     _tell_clamps(result.frames)
-    if any("height_assumed" in frame.flags for frame in result.frames):
-        say(
-            "height_assumed: nobody said how high the rod's axis lies above the board; "
-            "0 mm is taken: give --rod-height-mm (half the rod's side, and what lies "
-            "under it), 0 if the board lay at its height",
-            err=True,
-        )
+    for flag, words in _EXPLAINED.items():
+        count = sum(flag in frame.flags for frame in result.frames)
+        if count:
+            many = "s" if count > 1 else ""
+            say(f"{flag} ({count} photograph{many}): {words}", err=True)
     say(f"{result.out}: {result.measured} of {len(result.frames)} photographs measured")
 
 
@@ -145,3 +164,18 @@ def tell_ringing(found: Ringing, settle_mm: float) -> None:
         f"amplitude {found.amplitude_mm:.3f} mm at {found.first_s:.3f} s; {settled} "
         f"({found.frames} frames, {found.residual_mm:.3f} mm left)"
     )
+
+
+def tell_tag(placed: TagPlace, out: Path) -> None:
+    """Print where the rod leaves the clamp, seen from its tag, for people."""
+    for image, why in placed.left_out.items():
+        say(f"{image}: left out: {why}", err=True)
+    tag = placed.tag
+    say(
+        f"tag {tag.number}: the rod leaves the clamp {tag.root_x_mm:.3f} mm above and "
+        f"{tag.root_y_mm:.3f} mm left of its middle, as printed, known to "
+        f"{tag.place_sd_mm:.3f} mm along the rod; its direction is "
+        f"{tag.angle_deg:.3f} +- {tag.angle_sd_deg:.3f} deg from the tag's upward "
+        f"({len(placed.used)} photographs)"
+    )
+    say(f"{out}: written")

@@ -46,6 +46,12 @@ from .batch.tables import (
 from .batch.tables import (
     write_frames as write_frames,
 )
+from .batch.tag_place import (
+    TagPlace as TagPlace,
+)
+from .batch.tag_place import (
+    tag_place as tag_place,
+)
 from .camera.board import (
     Board as Board,
 )
@@ -75,6 +81,15 @@ from .camera.calibration_file import (
 )
 from .camera.calibration_file import (
     write_calibration as write_calibration,
+)
+from .camera.clamp_tag import (
+    ClampTag as ClampTag,
+)
+from .camera.clamp_tag import (
+    tag_number as tag_number,
+)
+from .camera.find_tag import (
+    find_tag as find_tag,
 )
 from .camera.oriented import (
     oriented as oriented,

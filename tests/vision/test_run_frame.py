@@ -185,3 +185,17 @@ def test_pixels_have_no_frame_to_share(run, tmp_path):
     result = extract_files([run], tmp_path, setting=Setting(), overlays=False)
     assert result.measured == len(BENDS)
     assert not any(row.shared_clamp for row in result.frames)
+
+
+def test_a_photograph_in_which_the_rod_has_another_length_is_named(frames, tmp_path):
+    images = [frame.image for frame in frames]
+    nearer = draw(
+        curve("arc", angle_deg=45.0), np.random.default_rng(9),
+        px_per_mm=1.01 * SCALE, size_px=SIZE, light=CLEAN, angle_deg=HEADING,
+        clamp_px=(200.0, 520.0),
+    )  # fmt: skip
+    run = write(tmp_path / "raised", [*images, nearer.image])
+    rows, _ = extracted(run, tmp_path / "out")
+    assert ["length_differs" in row.flags for row in rows] == 4 * [False] + [True]
+    again, _ = extracted(run, tmp_path / "out", resume=True, shared_clamp=False)
+    assert not any("length_differs" in row.flags for row in again)

@@ -19,9 +19,14 @@ from .tables import Done, FrameRow
 
 Array = NDArray[np.float64]
 
-MOVED = "clamp_moved"
+MOVED, LENGTH_DIFFERS = "clamp_moved", "length_differs"
+_OF_RUN = frozenset({MOVED, LENGTH_DIFFERS})
+"""What only the photographs of a run together tell."""
+_LENGTH_SDS, _LENGTH_PART = 4.0, 0.003
+"""A rod keeps its length: a photograph that differs from the others by more than so
+many deviations, and by this part, is seen by a camera that does not fit, or wrong."""
 _DOUBTFUL = "direction_doubtful"
-_NOT_HELD = frozenset({"no_clamp", "clamp_at_border"})
+NOT_HELD = frozenset({"no_clamp", "clamp_at_border"})
 """Rods that no clamp in the picture holds have no direction to share."""
 
 
@@ -45,19 +50,33 @@ def in_run_frames(done: Iterable[Done], runs: Mapping[str, str]) -> list[Done]:
         if len(readings) < 2:
             continue
         direction = shared_direction(list(readings.values()))
+        longer = _of_other_length([ready[index].row for index in readings])
         for index in readings:
             ready[index] = (
-                _flagged(ready[index])
+                _flagged(ready[index], MOVED)
                 if direction is None
                 else _in_frame(ready[index], direction, run)
             )
+            if ready[index].row.image in longer:
+                ready[index] = _flagged(ready[index], LENGTH_DIFFERS)
     return ready
+
+
+def _of_other_length(rows: list[FrameRow]) -> set[str]:
+    """Return the images whose rod is longer or shorter than in most of its run."""
+    length = np.array([row.length_mm for row in rows])
+    sd = np.array([row.length_sd_mm for row in rows])
+    off = np.abs(length - np.median(length))
+    least = np.maximum(_LENGTH_SDS * sd, _LENGTH_PART * np.median(length))
+    return {
+        row.image for row, differs in zip(rows, off > least, strict=True) if differs
+    }
 
 
 def in_own_frame(done: Done) -> Done:
     """Return a photograph as it was before `in_run_frames`."""
     row = done.row
-    if not row.shared_clamp and MOVED not in row.flags:
+    if not row.shared_clamp and not _OF_RUN & set(row.flags):
         return done
     own = Direction(angle_deg=row.own_angle_deg, sd_deg=row.own_angle_sd_deg)
     return _in_frame(done, own, "")
@@ -70,7 +89,7 @@ def _in_frame(done: Done, to: Direction, run: str) -> Done:
     turn_deg = to.angle_deg - row.pose.angle_deg
     turn_deg = (turn_deg + 180.0) % 360.0 - 180.0
     turn = math.radians(turn_deg)
-    flags = tuple(flag for flag in row.flags if flag not in (MOVED, _DOUBTFUL))
+    flags = tuple(flag for flag in row.flags if flag not in _OF_RUN | {_DOUBTFUL})
     if direction_is_doubtful(to.sd_deg, row.length_mm):
         flags = (*flags, _DOUBTFUL)
     tip = np.array(row.tip_mm)
@@ -109,15 +128,15 @@ def _turned(x: Array, y: Array, turn: float) -> tuple[Array, Array]:
     return c * x + s * y, c * y - s * x
 
 
-def _flagged(done: Done) -> Done:
-    return replace(done, row=replace(done.row, flags=(*done.row.flags, MOVED)))
+def _flagged(done: Done, flag: str) -> Done:
+    return replace(done, row=replace(done.row, flags=(*done.row.flags, flag)))
 
 
 def _reading(row: FrameRow) -> Reading | None:
     """Return how a photograph sees the clamp; None where it does not, in mm."""
     if row.pose is None or not math.isfinite(row.own_angle_sd_deg):
         return None
-    if _NOT_HELD & set(row.flags):
+    if NOT_HELD & set(row.flags):
         return None
     return Reading(
         x_mm=row.pose.x_mm,

@@ -80,7 +80,7 @@ class Board:
             self._check_dictionary()
 
     def _check_dictionary(self) -> None:
-        held = len(_dictionary(self.dictionary).bytesList)
+        held = len(dictionary_of(self.dictionary).bytesList)
         if held < self.markers:
             raise InputError(
                 f"dictionary must hold the {self.markers} markers of a board of "
@@ -136,7 +136,7 @@ class Board:
             (self.columns, self.rows),
             float(self.square_mm),
             float(self.marker_mm),
-            _dictionary(self.dictionary),
+            dictionary_of(self.dictionary),
         )
         board.setLegacyPattern(self.legacy)
         return board
@@ -154,7 +154,6 @@ class Board:
         outlines: list[Array] = []
         signs: list[int] = []
         square, marker = self.square_mm, self.marker_mm
-        table = _dictionary(self.dictionary)
         number = 0
         # OpenCV starts with black, except for even rows of its old pattern.
         start = 1 if self.legacy and self.rows % 2 == 0 else 0
@@ -166,17 +165,38 @@ class Board:
                     signs.append(1)
                     continue
                 edge = (square - marker) / 2.0
-                outlines.append(_box(x + edge, y + edge, marker))
-                signs.append(1)
-                bits = _bits(table, number)
+                inked = marker_polygons(
+                    self.dictionary, number, (x + edge, y + edge), marker
+                )
                 number += 1
-                cell = marker / (len(bits) + 2)
-                for i, j in np.argwhere(bits):
-                    left, top = x + edge + (j + 1) * cell, y + edge + (i + 1) * cell
-                    outlines.append(_box(left, top, cell))
-                    signs.append(-1)
+                outlines += inked[0]
+                signs += inked[1]
         scaled = [outline * self.print_scale for outline in outlines]
         return scaled, signs
+
+
+def marker_polygons(
+    dictionary: str, number: int, left_top_mm: tuple[float, float], side_mm: float
+) -> tuple[list[Array], list[int]]:
+    """Return what is black of a marker, as `Board.black_polygons` does.
+
+    Parameters
+    ----------
+    dictionary, number : str, int
+        Which marker of which dictionary of OpenCV.
+    left_top_mm : tuple of float
+        Its left top corner, y running down.
+    side_mm : float
+        Its side with the black frame.
+    """
+    left, top = left_top_mm
+    bits = _bits(dictionary_of(dictionary), number)
+    cell = side_mm / (len(bits) + 2)
+    white = [
+        _box(left + (j + 1) * cell, top + (i + 1) * cell, cell)
+        for i, j in np.argwhere(bits)
+    ]
+    return [_box(left, top, side_mm), *white], [1] + [-1] * len(white)
 
 
 def _box(left: float, top: float, side: float) -> Array:
@@ -186,7 +206,8 @@ def _box(left: float, top: float, side: float) -> Array:
     return np.column_stack([x, y])
 
 
-def _dictionary(name: str) -> Any:
+def dictionary_of(name: str) -> Any:
+    """Return OpenCV's dictionary of a name."""
     number = getattr(cv2.aruco, name, None)
     if not name.startswith("DICT_") or not isinstance(number, int):
         raise InputError(

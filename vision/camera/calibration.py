@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import InputError, VisionError
 from ..measurement import Pose
+from .clamp_tag import ClampTag
 from .projection import Camera, points_to_picture, points_to_plane
 
 Array = NDArray[np.float64]
@@ -71,6 +72,8 @@ class Calibration:
         The board as a sentence, and each photograph with its verdict.
     orientation : int or None
         EXIF's 1 to 8 of the plane photograph (see `oriented`); None where unknown.
+    clamp_tag : ClampTag or None
+        A tag that is glued on the clamp.
     """
 
     image_size_px: tuple[int, int]
@@ -88,6 +91,7 @@ class Calibration:
     board: str = ""
     views: tuple[View, ...] = ()
     orientation: int | None = None
+    clamp_tag: ClampTag | None = None
 
     def __post_init__(self) -> None:
         for name, shape in (("rotation", (3, 3)), ("translation_mm", (3,))):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -13,6 +14,7 @@ from ...core.errors import ConfigError, InputError
 from ...core.json import write_json
 from ...core.toml import FileModel, read_toml
 from .calibration import Calibration, View
+from .clamp_tag import ClampTag
 
 Pair = tuple[float, float]
 Positive = Annotated[float, Field(gt=0.0)]
@@ -27,6 +29,21 @@ class ViewModel(FileModel):
     corners: int
     used: bool
     why_not: str = ""
+
+
+class TagModel(FileModel):
+    """The tag on the clamp; see `ClampTag`."""
+
+    dictionary: str
+    number: int
+    side_mm: Positive
+    height_mm: float
+    root_x_mm: float
+    root_y_mm: float
+    angle_deg: float
+    place_sd_mm: Positive
+    angle_sd_deg: Positive
+    board_angle_deg: float | None = None
 
 
 class CalibrationModel(FileModel):
@@ -50,6 +67,7 @@ class CalibrationModel(FileModel):
     board: str = ""
     views: tuple[ViewModel, ...] = ()
     orientation: Annotated[int, Field(ge=1, le=8)] | None = None
+    clamp_tag: TagModel | None = None
 
 
 def write_calibration(calibration: Calibration, path: Path) -> None:
@@ -79,6 +97,7 @@ def write_calibration(calibration: Calibration, path: Path) -> None:
             for view in calibration.views
         ],
         "orientation": calibration.orientation,
+        "clamp_tag": calibration.clamp_tag and asdict(calibration.clamp_tag),
     }  # fmt: skip
     write_json(path, data)
 
@@ -125,6 +144,11 @@ def _calibration(model: CalibrationModel) -> Calibration:
             for view in model.views
         ),
         orientation=model.orientation,
+        clamp_tag=(
+            None
+            if model.clamp_tag is None
+            else ClampTag(**model.clamp_tag.model_dump())
+        ),
     )
 
 

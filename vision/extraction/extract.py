@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import MagbendError
 from ..camera.calibration import Calibration
+from ..camera.find_tag import TaggedClamp, tagged_clamp
 from ..camera.oriented import oriented
 from ..edge.state import LostError
 from ..find.choose import find_rod, search_rod
@@ -174,9 +175,15 @@ def finish(
     if near and not refined.settled:
         raise LostError("edges_lost", "the rod moved too far since the last frame")
     refusal(view, refined, candidate)
-    result = measurement(refined, view, setting)
+    result = measurement(refined, view, setting, _told(photo, setting))
     result = replace(result, inverted=view.sign < 0.0, mix=view.mix)
     return doubts(result, photo, view, refined, candidate, setting)
+
+
+def _told(photo: Photo, setting: Setting) -> TaggedClamp | None:
+    """Return what a tag on the clamp tells, where there is one."""
+    camera = setting.calibration
+    return None if camera is None else tagged_clamp(photo.grey, camera)
 
 
 def _start(grey: Image, candidate: Candidate, sign: float, blur: float = 1.0) -> Start:

@@ -16,7 +16,7 @@ from ..measurement import Measurement
 from ..picture.photo import Photo
 from .deviations import scale_sd
 from .refine import Refined
-from .root import root_hidden
+from .root import HIDDEN_MM, root_hidden
 from .setting import Setting
 
 LENGTH_TOLERANCE = 0.02
@@ -106,7 +106,8 @@ def doubts(
         flags.append("clamp_at_border")
     if candidate.root == "free":
         flags.append("no_clamp")
-    if root_hidden(refined, setting):
+    # By a tag the place may be known all the same.
+    if root_hidden(refined, setting) and result.clamp_sd_mm > 0.5 * HIDDEN_MM:
         flags.append("root_hidden")
     if candidate.root == "clamp" and _goes_on(photo, refined):
         flags.append("clamp_doubtful")
@@ -123,11 +124,19 @@ def doubts(
         flags.append("rough_edges")
     if refined.tip.scatter > 0.5 or abs(refined.tip.skew) > 0.2:
         flags.append("ragged_tip")
-    length = result.length_mm
-    nominal = setting.length_mm
-    if nominal is not None and abs(length / nominal - 1.0) > LENGTH_TOLERANCE:
+    if _length_is_off(result, setting):
         flags.append("length_mismatch")
     return replace(result, flags=tuple(flags))
+
+
+def _length_is_off(result: Measurement, setting: Setting) -> bool:
+    """Whether a rod has another length than it should have."""
+    if setting.length_mm is None:
+        return False
+    tolerance = LENGTH_TOLERANCE * setting.length_mm
+    if setting.length_sd_mm is not None:
+        tolerance = 3.0 * math.hypot(setting.length_sd_mm, result.length_sd_mm)
+    return abs(result.length_mm - setting.length_mm) > tolerance
 
 
 def _tip_goes_on(view: View, refined: Refined) -> bool:

@@ -39,6 +39,8 @@ class Setting:
         Arc lengths at which the stiffness jumps, and so the curvature may.
     length_mm : float or None
         Nominal free length; a measured length 2 % off is flagged ``length_mismatch``.
+    length_sd_mm : float or None
+        How well that is known: then a length is off that differs by three deviations.
     side_mm : float or None
         Nominal side of its section: tells the rod from other long thin things.
     clamp : {"auto", "none"}
@@ -57,6 +59,7 @@ class Setting:
     invert: bool | None = None
     joints_mm: tuple[float, ...] = ()
     length_mm: float | None = None
+    length_sd_mm: float | None = None
     side_mm: float | None = None
     clamp: Clamp = "auto"
     clamp_height_mm: float | None = None
@@ -142,8 +145,10 @@ def with_specimen(setting: Setting, specimen: Specimen) -> Setting:
     specimen : Specimen
         Tells side, length and joints.
     """
+    own_sd_mm = specimen.length_sd_mm if setting.length_mm is None else None
     return replace(
         setting,
+        length_sd_mm=setting.length_sd_mm or own_sd_mm,
         side_mm=setting.side_mm or specimen.side_mm,
         length_mm=setting.length_mm or specimen.length_mm,
         joints_mm=setting.joints_mm or specimen.joints_mm,

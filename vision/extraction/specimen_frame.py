@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera.calibration import Calibration
+from ..camera.find_tag import TaggedClamp
 from ..curve.robust import median
 from ..edge.state import LostError
 from ..find.ground import View
@@ -24,6 +25,7 @@ from .deviations import side_face, with_deviations
 from .refine import Refined
 from .root import RootPlace, root_place
 from .setting import Setting, arc_mm, silhouette
+from .told_clamp import ToldClamp, surer_direction, told_clamp
 
 Array = NDArray[np.float64]
 
@@ -48,11 +50,16 @@ POINTS = 121
 """Points of a measured centreline."""
 
 
-def measurement(refined: Refined, seen_in: View, setting: Setting) -> Measurement:
-    """Return the measurement of a refined rod, without doubts yet."""
+def measurement(
+    refined: Refined, seen_in: View, setting: Setting, tag: TaggedClamp | None = None
+) -> Measurement:
+    """Return the measurement of a refined rod, without doubts yet.
+
+    `tag` is the clamp's place and direction as a tag on it tells them.
+    """
     if setting.calibration is None:
         return _uncalibrated(refined)
-    return _calibrated(refined, seen_in, setting, setting.calibration)
+    return _calibrated(refined, seen_in, setting, setting.calibration, tag)
 
 
 def _uncalibrated(refined: Refined) -> Measurement:
@@ -99,14 +106,16 @@ def _pixel_columns(
 
 
 def _calibrated(
-    refined: Refined, seen_in: View, setting: Setting, camera: Calibration
-) -> Measurement:
+    refined: Refined, seen_in: View, setting: Setting, camera: Calibration,
+    tag: TaggedClamp | None,
+) -> Measurement:  # fmt: skip
     curve = refined.fit.curve
     ends = setting.view(camera, curve.points[[0, -1]], curve.theta[[0, -1]])
     side_mm = refined.typical_width / float(silhouette(ends).mean())
     last = refined.tip.s - 0.5 * side_mm * abs(float(ends.rise_along[1]))
-    root = root_place(refined, ends, setting, side_mm)
-    s = np.linspace(root.s, last, 4 * POINTS)
+    seen = root_place(refined, ends, setting, side_mm)
+    told = told_clamp(seen, tag, refined, setting, camera)
+    s = np.linspace(told.root.s, last, 4 * POINTS)
     points, _ = curve.at(s)
     s_mm = arc_mm(camera.to_mm(points, height_mm=setting.axis_height_mm))
     if not np.isfinite(s_mm[-1]):
@@ -116,11 +125,11 @@ def _calibrated(
         )
     even = np.linspace(0.0, s_mm[-1], POINTS)
     at = np.interp(even, s_mm, s)
-    return _in_frame(refined, root, seen_in, setting, even, at, camera)
+    return _in_frame(refined, told, seen_in, setting, even, at, camera)
 
 
 def _in_frame(
-    refined: Refined, root: RootPlace, seen_in: View, setting: Setting, s_mm: Array,
+    refined: Refined, told: ToldClamp, seen_in: View, setting: Setting, s_mm: Array,
     s: Array, camera: Calibration,
 ) -> Measurement:  # fmt: skip
     """Return the measurement at these arc lengths, in mm and px."""
@@ -128,38 +137,41 @@ def _in_frame(
     grid = fit.curve
     points, theta = grid.at(s)
     view = setting.view(camera, points, theta)
-    heading = view.heading
+    heading, root = view.heading, told.root
+    across = silhouette(view)
+    wall = np.abs(view.rise_across) * np.interp(s, grid.s, refined.width) / across
+    own_sd_deg = _clamp_sd_deg(refined, np.interp(grid.s, s, wall), root)
+    angle_deg, sd_deg, flags = surer_direction(
+        told, float(np.degrees(heading[0])), own_sd_deg
+    )
     pose = Pose(
         x_mm=float(view.x_mm[0]), y_mm=float(view.y_mm[0]),
-        angle_deg=float(np.degrees(heading[0])), height_mm=setting.axis_height_mm,
+        angle_deg=angle_deg, height_mm=setting.axis_height_mm,
     )  # fmt: skip
     own = pose.from_board(np.column_stack([view.x_mm, view.y_mm]))
     # y runs down in the picture: there the heading turns the other way.
     kappa = np.gradient(heading + theta, s_mm[1])
     kappa -= np.interp(s, grid.s, grid.kappa) * view.along
     table = _pixel_columns(refined, s, points, theta)
-    across = silhouette(view)
-    wall = np.abs(view.rise_across) * table["width_px"] / across
     doubt = side_face(seen_in) * wall
     table["sigma_px"] = np.hypot(table["sigma_px"], doubt)
     table |= {
         "s_mm": s_mm,
         "x_mm": own[:, 0],
         "y_mm": own[:, 1],
-        "theta_rad": heading - heading[0],
+        "theta_rad": heading - math.radians(angle_deg),
         "kappa_per_mm": kappa,
         "width_mm": table["width_px"] / across,
         "sigma_mm": table["sigma_px"] / view.along,
         "sigma_kappa_per_mm": np.interp(s, grid.s, fit.sigma_kappa) * view.along,
         "sigma_width_mm": np.interp(s, grid.s, refined.sigma_width) / across,
     }
-    sd_deg = _clamp_sd_deg(refined, np.interp(grid.s, s, wall), root)
     result = Measurement(
         status="ok",
         points=table,
         length_mm=float(s_mm[-1]),
         tip_mm=(float(own[-1, 0]), float(own[-1, 1])),
-        tip_angle_deg=float(np.degrees(heading[-1] - heading[0])),
+        tip_angle_deg=float(np.degrees(heading[-1])) - angle_deg,
         width_mm=median(table["width_mm"][table["good"] > 0.5]),
         clamp_angle_sd_deg=sd_deg,
         length_px=float(s[-1] - s[0]),
@@ -167,7 +179,7 @@ def _in_frame(
         clamp_px=(float(points[0, 0]), float(points[0, 1])),
         tip_px=(float(points[-1, 0]), float(points[-1, 1])),
         pose=pose,
-        flags=("clamp_lines_differ",) if root.lines_differ else (),
+        flags=(*flags, *(("clamp_lines_differ",) if root.lines_differ else ())),
     )
     height_mm = setting.axis_height_mm
     faces = side_face(seen_in)

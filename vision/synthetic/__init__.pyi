@@ -17,6 +17,9 @@ from .parts import (
     Block as Block,
 )
 from .parts import (
+    Label as Label,
+)
+from .parts import (
     Mark as Mark,
 )
 from .parts import (

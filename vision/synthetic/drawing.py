@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from ..camera.calibration import Calibration
 from ..edge.wall_light import reflectance
-from ..picture.raster import coverage, strip
-from .parts import Block, Colour, Mark, Rod, SceneLight
+from ..picture.raster import coverage, coverage_of, strip
+from .parts import INK, PAPER, Block, Colour, Label, Mark, Rod, SceneLight
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.float32]
@@ -55,7 +55,7 @@ def _beside(whole: Picture, top: Picture) -> Picture:
 
 
 def draw_top(picture: Picture, block: Block, camera: Calibration) -> None:
-    """Draw the top of a block with its screws."""
+    """Draw the top of a block with its screws and its label."""
     size = camera.image_size_px
     height = block.height_mm
     top = camera.to_px(subdivide(_block_corners(block)), height_mm=height)
@@ -70,6 +70,22 @@ def draw_top(picture: Picture, block: Block, camera: Calibration) -> None:
             outline = camera.to_px(block.pose.to_board(ring), height_mm=height)
             colour = scaled(block.colour, factor)
             paint(picture, coverage(outline, *size), colour)
+    if block.label is not None:
+        _draw_label(picture, block, block.label, camera)
+
+
+def _draw_label(
+    picture: Picture, block: Block, label: Label, camera: Calibration
+) -> None:
+    def seen(outline_mm: Array) -> Array:
+        on_board = block.pose.to_board(subdivide(outline_mm))
+        return camera.to_px(on_board, height_mm=block.height_mm)
+
+    size = camera.image_size_px
+    paint(picture, coverage(seen(label.sheet_mm), *size), PAPER)
+    outlines, signs = label.black_polygons()
+    ink = coverage_of([seen(outline) for outline in outlines], signs, *size)
+    paint(picture, ink, INK)
 
 
 def block_shadow(block: Block, camera: Calibration, light: SceneLight) -> Picture:

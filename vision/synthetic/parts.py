@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.centreline import Centreline
+from ..camera.board import marker_polygons
 from ..camera.calibration import Calibration
+from ..camera.clamp_tag import ClampTag
 from ..measurement import Pose
 
 Array = NDArray[np.float64]
@@ -30,6 +32,8 @@ PAPER: Colour = (0.70, 0.71, 0.71)
 
 RUBBER: Colour = (0.048, 0.048, 0.048)
 
+INK: Colour = (0.035, 0.035, 0.035)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Block:
@@ -45,6 +49,8 @@ class Block:
         Reflectance in blue, green, red, from 0 to 1.
     screws_mm : tuple of float
         Distances of screw heads behind the front face.
+    label : Label, optional
+        A printed tag on its top.
     """
 
     pose: Pose
@@ -53,6 +59,45 @@ class Block:
     height_mm: float = 4.0
     colour: Colour = GREY
     screws_mm: tuple[float, ...] = (6.0, 16.0)
+    label: Label | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Label:
+    """A printed tag, cut out with a white margin of a cell and glued on a block.
+
+    Parameters
+    ----------
+    tag : ClampTag
+        Which marker, and its side.
+    x_mm, y_mm, angle_deg : float
+        Its middle and the direction of its x axis, in the frame of the block.
+    """
+
+    tag: ClampTag
+    x_mm: float
+    y_mm: float = 0.0
+    angle_deg: float = 0.0
+
+    @property
+    def sheet_mm(self) -> Array:
+        """Corners of the paper, shape (4, 2), in the frame of the block."""
+        half = self.tag.side_mm * (0.5 + 1.0 / 6.0)
+        corners = np.array([[half, half], [half, -half], [-half, -half], [-half, half]])
+        return self._place.to_board(corners)
+
+    def black_polygons(self) -> tuple[list[Array], list[int]]:
+        """Return what is printed black, as `Board.black_polygons` does."""
+        side = self.tag.side_mm
+        inked, signs = marker_polygons(
+            self.tag.dictionary, self.tag.number, (-0.5 * side, -0.5 * side), side
+        )
+        return [self._place.to_board(outline) for outline in inked], signs
+
+    @property
+    def _place(self) -> Pose:
+        # Printed, x runs right; in the tag's frame it runs up.
+        return Pose(x_mm=self.x_mm, y_mm=self.y_mm, angle_deg=self.angle_deg - 90.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -32,7 +32,7 @@ from .drawing import (
     scaled,
     subdivide,
 )
-from .parts import PAPER, Block, Colour, Scene, SceneLight
+from .parts import INK, PAPER, Block, Colour, Scene, SceneLight
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.float32]
@@ -131,7 +131,7 @@ def render_board(
     outlines, signs = board.black_polygons()
     pixels = [camera.to_px(subdivide(outline)) for outline in outlines]
     ink = coverage_of(pixels, signs, *camera.image_size_px)
-    paint(picture, ink, (0.035, 0.035, 0.035))
+    paint(picture, ink, INK)
     return expose(picture, lit, rng)
 
 
