@@ -157,6 +157,15 @@ from .library.space import (
 from .library.sql import (
     ask as ask,
 )
+from .lumen.run import (
+    InLumen as InLumen,
+)
+from .lumen.run import (
+    lumen_table as lumen_table,
+)
+from .lumen.run import (
+    measure_in_lumen as measure_in_lumen,
+)
 from .package.crate import (
     Description as Description,
 )
@@ -251,7 +260,7 @@ from .twin.run import (
     bench_run as bench_run,
 )
 from .twin.run import (
-    keep_board as keep_board,
+    keep_stills as keep_stills,
 )
 from .twin.run import (
     open_twin_bench as open_twin_bench,

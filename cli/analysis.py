@@ -5,6 +5,7 @@ from __future__ import annotations
 from . import (
     analysis_fit,
     analysis_import,
+    analysis_lumen,
     analysis_model,
     analysis_out,
     analysis_runs,
@@ -21,6 +22,7 @@ app = group(
 analysis_runs.register(app)
 analysis_fit.register(app)
 analysis_import.register(app)
+app.command("lumen", epilog=analysis_lumen.EXAMPLE)(analysis_lumen.lumen)
 analysis_model.register(app)
 analysis_out.register(app)
 app.add_typer(recipe.app)

@@ -94,7 +94,7 @@ def open_bench(
         Typed readings per gap that replace the meter.
     twin_seed : int or None
         Seed of the computed bench; None opens the real one. The computed bench leaves
-        a photograph of its calibration board as ``board.png``.
+        its stills beside the run: ``board.png``, and ``bare.png`` of a lumen.
     camera : bool
         False where no picture is taken.
     control : RunControl, optional
@@ -118,14 +118,14 @@ def open_bench(
                 ask=asker(plan) if asks_flux(plan, readings_mT) else None,
             )  # fmt: skip
         else:
-            from ..analysis import keep_board, open_twin_bench
+            from ..analysis import keep_stills, open_twin_bench
 
             bench, devices = open_twin_bench(plan, seed=twin_seed, clock=clock, log=log)
         owner.commands["stop"] = stopping(devices.stage)
         with contextlib.closing(devices):
             yield devices
         if twin_seed is not None and camera:
-            keep_board(bench, folder)
+            keep_stills(bench, folder)
 
 
 def _clock(twin_seed: int | None, speed: float | None) -> Clock:

@@ -38,6 +38,9 @@ from .batch.tables import (
     read_centrelines as read_centrelines,
 )
 from .batch.tables import (
+    read_edges as read_edges,
+)
+from .batch.tables import (
     read_frames as read_frames,
 )
 from .batch.tables import (
@@ -111,6 +114,12 @@ from .extraction.hints import (
 )
 from .extraction.hints import (
     measure_hinted as measure_hinted,
+)
+from .extraction.outline import (
+    Placed as Placed,
+)
+from .extraction.outline import (
+    place_outline as place_outline,
 )
 from .extraction.ring import (
     Ringing as Ringing,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
@@ -40,7 +41,8 @@ class Step:
     """One finished step of a run; NaN where nothing was read.
 
     `imported` is a shape that another program simulated for it (see
-    `analysis.imports`), None where there is none.
+    `analysis.imports`), None where there is none; `settings` are what other axes than
+    the stage were set to.
     """
 
     index: int
@@ -52,6 +54,7 @@ class Step:
     flags: tuple[str, ...] = ()
     time_utc: str = ""
     imported: Centreline | None = field(default=None, repr=False)
+    settings: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -197,6 +197,7 @@ def _step(data: dict[str, Any]) -> Step:
         image=images[0] if images else str(data.get("image") or ""),
         flags=tuple(data.get("flags") or ()),
         time_utc=str(data.get("time_utc", "")),
+        settings=dict(data.get("settings") or {}),
     )
 
 

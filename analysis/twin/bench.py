@@ -29,7 +29,7 @@ from ...vision.synthetic import (
     scene_camera,
 )
 
-_LIGHT = SceneLight()
+LIGHT = SceneLight()
 _MIDDLE_GAP_MM = 60.0
 """The gap at which the rod lies in the middle of the picture."""
 
@@ -142,7 +142,7 @@ class TwinBench:
         # The wider of the two: a long rod needs a camera farther up.
         span_mm = max(58.0, 1.6 * specimen.length_mm)
         self._camera = scene_camera(height_mm=330.0 * span_mm / 58.0, tilt_deg=1.5)
-        self._painted: tuple[float, NDArray[np.float32]] | None = None
+        self._painted: tuple[object, NDArray[np.float32]] | None = None
         self._exposed: list[NDArray[np.uint8]] = []
         self._turn = 0
         self.shows_board = False
@@ -180,26 +180,35 @@ class TwinBench:
         del time_s
         if self.shows_board:
             return self.photograph_board()
-        if self._painted is None or self._painted[0] != gap_mm:
-            self._painted = (gap_mm, paint_scene(self._scene(gap_mm), self._camera))
+        state = self._state(gap_mm)
+        if self._painted is None or self._painted[0] != state:
+            self._painted = (state, paint_scene(self._scene(gap_mm), self._camera))
             self._exposed = []
         if self.exposures is not None and len(self._exposed) >= self.exposures:
             self._turn = (self._turn + 1) % self.exposures
             return self._exposed[self._turn]
-        picture = expose(self._painted[1], _LIGHT, self._noise)
+        picture = expose(self._painted[1], LIGHT, self._noise)
         self._exposed = [*self._exposed, picture] if self.exposures else []
         return picture
+
+    def stills(self) -> dict[str, NDArray[np.uint8]]:
+        """Return the pictures that a run's folder gets beside its own, by file name."""
+        return {"board.png": self.photograph_board()}
 
     def photograph_board(self) -> NDArray[np.uint8]:
         """Return the same camera's picture of the calibration board on the paper."""
         return render_board(
-            self.board, self._camera, self._noise, light=_LIGHT, paper_seed=self._seed
+            self.board, self._camera, self._noise, light=LIGHT, paper_seed=self._seed
         )
 
     def photograph_empty_clamp(self, gap_mm: float) -> NDArray[np.uint8]:
         """Return a picture in which the rod has fallen out of the clamp."""
         scene = replace(self._scene(gap_mm), centreline=None)
-        return expose(paint_scene(scene, self._camera), _LIGHT, self._noise)
+        return expose(paint_scene(scene, self._camera), LIGHT, self._noise)
+
+    def _state(self, gap_mm: float) -> object:
+        """Return what the picture of a still scene depends on."""
+        return gap_mm
 
     def _scene(self, gap_mm: float) -> Scene:
         # The camera stands still beside the magnet; the platform moves toward it.
@@ -215,6 +224,6 @@ class TwinBench:
             clamp=Block(pose=pose),
             centreline=self.solution(gap_mm).centreline,
             side_mm=self.truth.specimen.side_mm,
-            light=_LIGHT,
+            light=LIGHT,
             paper_seed=self._seed,
         )

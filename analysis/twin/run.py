@@ -31,6 +31,7 @@ from ...rig import (
     write_templates,
 )
 from ...rig.virtual import open_twin
+from ...sim.navigate import lumen_of
 from ...vision import (
     Calibration,
     Setting,
@@ -41,6 +42,7 @@ from ...vision import (
 )
 from ..runs.witness import witness_of
 from .bench import HiddenTruth, TwinBench
+from .lumen_bench import LumenBench
 
 _SWING = {"swing_mm": 1.0, "swing_Hz": 2.0, "damping_s": 0.4}
 """How the twin's rod swings after the stage arrived."""
@@ -82,14 +84,26 @@ def open_twin_bench(
             f"{plan.rig_path}: the twin bench needs a magnet; add the table [magnet] "
             f"with side_mm and remanence_T"
         )
-    bench = TwinBench(
-        plan.specimen, plan.rig.magnet.magnet(), seed=seed, truth=truth,
-        gravity_m_s2=plan.gravity_m_s2,
-    )  # fmt: skip
+    magnet = plan.rig.magnet.magnet()
+    swing: dict[str, Any] = _SWING
+    if plan.model.lumen is None:
+        bench = TwinBench(
+            plan.specimen, magnet, seed=seed, truth=truth,
+            gravity_m_s2=plan.gravity_m_s2,
+        )  # fmt: skip
+    else:
+        # Walls keep the rod from swinging.
+        swing = {"swing_mm": 0.0}
+        bench = LumenBench(
+            plan.specimen, magnet, lumen_of(plan.lumen_text), seed=seed, truth=truth,
+            wall_height_mm=plan.model.lumen.wall_height_mm,
+        )  # fmt: skip
     devices = open_twin(
         plan.rig, bench.photograph, bench.flux_mT,
-        seed=seed, clock=clock, log=log, camera={**_SWING, **(camera or {})},
+        seed=seed, clock=clock, log=log, camera={**swing, **(camera or {})},
     )  # fmt: skip
+    if isinstance(bench, LumenBench):
+        bench.axes = devices.axes
     return bench, devices
 
 
@@ -128,25 +142,21 @@ def run_on_twin(
     return bench, summary
 
 
-def photograph_board(bench: TwinBench, path: Path) -> None:
-    """Write the twin camera's picture of the calibration board as PNG."""
-    good, png = cv2.imencode(".png", bench.photograph_board())
-    if not good:
-        raise VisionError(f"{path}: the board's photograph could not be encoded")
-    write_bytes(path, np.asarray(png).tobytes())
-
-
-def keep_board(bench: TwinBench, folder: Path) -> None:
-    """Write the picture of the board into a run folder, and note what made it."""
-    path = folder / "board.png"
-    photograph_board(bench, path)
-    note_derived([path], sources=[folder / "run.json"], command="rig run --twin")
+def keep_stills(bench: TwinBench, folder: Path) -> None:
+    """Write the board's picture, and a bare channel's, into a run; note their maker."""
+    for name, picture in bench.stills().items():
+        path = folder / name
+        good, png = cv2.imencode(".png", picture)
+        if not good:
+            raise VisionError(f"{path}: the photograph could not be encoded")
+        write_bytes(path, np.asarray(png).tobytes())
+        note_derived([path], sources=[folder / "run.json"], command="rig run --twin")
 
 
 def calibrate_twin(bench: TwinBench, folder: Path) -> Calibration:
     """Photograph the twin's board and calibrate the run in `folder` with it."""
     path = folder / "board.png"
-    keep_board(bench, folder)
+    keep_stills(bench, folder)
     calibration = calibrate(
         read_photo(path), board=bench.board, rod_height_mm=bench.axis_height_mm
     )

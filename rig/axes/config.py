@@ -79,7 +79,7 @@ class AxisConfig(FileModel):
 
 
 class ScanConfig(FileModel):
-    """The values of one axis, each taken at each gap."""
+    """The values of one axis: each at each gap (`scan`), or one a gap (`along`)."""
 
     axis: str
     values: list[_FINITE] = Field(min_length=1, max_length=1000)

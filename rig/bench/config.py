@@ -28,6 +28,8 @@ from .stops import FAR, Order, Route, Stop, Sweep, out_of_order, stops_of
 from .twin_config import TwinConfig
 
 _MOST_STOPS = 10_000
+FEED = "insertion_mm"
+"""The axis that feeds a rod into its lumen."""
 
 
 class SettleConfig(FileModel):
@@ -123,6 +125,17 @@ class RigModel(FileModel):
         return self
 
 
+class LumenConfig(FileModel):
+    """The ``[lumen]`` table: the rod is fed through a printed channel.
+
+    `file` says where its walls are (`docs/navigation.md`); they stand still under the
+    camera, and an axis ``insertion_mm`` feeds the rod.
+    """
+
+    file: Path
+    wall_height_mm: PositiveFloat
+
+
 class PlanModel(FileModel):
     """A plan file that names the file of its specimen."""
 
@@ -138,6 +151,8 @@ class PlanModel(FileModel):
     reference: bool = False
     reference_gap_mm: PositiveFloat | None = None
     scan: list[ScanConfig] = Field(default_factory=list)
+    along: list[ScanConfig] = Field(default_factory=list)
+    lumen: LumenConfig | None = None
     settle: SettleConfig | None = None
     photograph: PhotographConfig = PhotographConfig()
     flux: FluxConfig = FluxConfig()
@@ -168,6 +183,8 @@ class Plan:
         The rod on the stage.
     settle : SettleConfig
         From the plan, else from the rig file, else the defaults.
+    lumen_text : str
+        What the file of its lumen says; empty without one.
     """
 
     path: Path
@@ -177,6 +194,7 @@ class Plan:
     rig_path: Path
     specimen: Specimen
     settle: SettleConfig
+    lumen_text: str = ""
 
     @property
     def stops(self) -> tuple[Stop, ...]:
@@ -198,6 +216,8 @@ class Plan:
         """Return the plan as the manifest of a run keeps it, defaults written out."""
         data = self.model.model_dump(mode="json")
         data.pop("specimen")
+        if self.lumen_text:
+            data["lumen"]["text"] = self.lumen_text
         data["gaps_mm"] = list(self.gaps_mm)
         data["stops"] = [stop.kind for stop in self.stops]
         data["settings"] = [dict(stop.settings) for stop in self.stops]
@@ -243,9 +263,11 @@ def read_plan(path: Path) -> Plan:
     else:
         specimen = read_specimen((path.parent / model.specimen).resolve())
     _check_gaps(path, text, model, rig, rig_path)
+    lumen = model.lumen
     return Plan(
         path=path, text=text, model=model, rig=rig, rig_path=rig_path,
         specimen=specimen, settle=model.settle or rig.settle or SettleConfig(),
+        lumen_text="" if lumen is None else read_text(path.parent / lumen.file),
     )  # fmt: skip
 
 
@@ -254,6 +276,12 @@ def _check_gaps(
 ) -> None:
     line = line_of(text, ("gaps_mm",))
     where = f"{path}, line {line}" if line else f"{path}"
+    for each in model.along:
+        if len(each.values) != len(model.gaps_mm):
+            raise ConfigError(
+                f"{where}: [[along]] {each.axis} must give one value a gap, "
+                f"{len(model.gaps_mm)}; instead it gives {len(each.values)}"
+            )
     stops = _stops(model, rig)
     if len(stops) > _MOST_STOPS:
         raise ConfigError(
@@ -283,16 +311,16 @@ def _check_gaps(
 def _check_scans(
     path: Path, text: str, model: PlanModel, rig: RigModel, rig_path: Path
 ) -> None:
-    """Refuse to scan what the rig has not, twice, or beyond its limits."""
-    line = line_of(text, ("scan",))
+    """Refuse to set what the rig has not, twice, or beyond its limits."""
+    line = line_of(text, ("scan",)) or line_of(text, ("along",))
     where = f"{path}, line {line}" if line else f"{path}"
     axes = {axis.name: axis for axis in rig.axis}
     seen: set[str] = set()
-    for scan in model.scan:
+    for scan in [*model.scan, *model.along]:
         if scan.axis not in axes:
             known = ", ".join(axes) or "none"
             raise ConfigError(
-                f"{where}: scan.axis = {scan.axis!r} is no [[axis]] of {rig_path.name} "
+                f"{where}: axis = {scan.axis!r} is no [[axis]] of {rig_path.name} "
                 f"(there: {known})"
             )
         if scan.axis in seen:
@@ -302,12 +330,19 @@ def _check_scans(
             why = why_not_set(axes[scan.axis], value)
             if why:
                 raise ConfigError(f"{where}: {scan.axis} {why} ({rig_path.name})")
+    if model.lumen is not None and FEED not in seen:
+        raise ConfigError(
+            f"{path}: a rod in a [lumen] must be fed by an axis {FEED}; name its "
+            f"values in [[along]], one a gap, or in [[scan]]"
+        )
 
 
 def _stops(model: PlanModel, rig: RigModel) -> tuple[Stop, ...]:
     far_mm = model.reference_gap_mm or rig.limits.max_gap_mm
     scans = {scan.axis: scan.values for scan in model.scan}
-    rest = {a.name: a.rest for a in rig.axis if a.rest is not None and a.name in scans}
+    along = {each.axis: each.values for each in model.along}
+    used = scans | along
+    rest = {a.name: a.rest for a in rig.axis if a.rest is not None and a.name in used}
     return stops_of(
         Route(
             gaps_mm=model.gaps_mm,
@@ -318,6 +353,7 @@ def _stops(model: PlanModel, rig: RigModel) -> tuple[Stop, ...]:
             reference=model.reference,
             baseline=model.flux.baseline,
             scans=scans,
+            along=along,
             rest=rest,
         )
     )

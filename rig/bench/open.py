@@ -249,7 +249,7 @@ def open_devices(
             camera = open_camera(plan.rig.camera, folder, clock)
             opened.callback(camera.close)
         axes: dict[str, Axis] = {}
-        for scan in plan.model.scan:
+        for scan in (*plan.model.scan, *plan.model.along):
             axes[scan.axis] = _open_axis(plan.rig, scan.axis, clock, log)
             opened.callback(axes[scan.axis].close)
         opened.pop_all()

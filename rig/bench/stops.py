@@ -59,6 +59,8 @@ class Route:
         Whether there are such.
     scans : mapping of str to sequence of float
         Values of other axes, each at each gap.
+    along : mapping of str to sequence of float
+        Values of other axes, one a gap.
     rest : mapping of str to float
         What axes are set to for references and baselines.
     """
@@ -71,6 +73,7 @@ class Route:
     reference: bool
     baseline: bool
     scans: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    along: Mapping[str, Sequence[float]] = field(default_factory=dict)
     rest: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -80,9 +83,15 @@ def stops_of(route: Route) -> tuple[Stop, ...]:
     if route.reference:
         stops.append(Stop(gap_mm=route.far_mm, kind="reference", settings=route.rest))
     for turn in range(1, route.repeats + 1):
-        for kind, gap_mm in _turn(route):
+        for kind, index in _turn(route):
+            here = {name: values[index] for name, values in route.along.items()}
             stops += [
-                Stop(gap_mm=gap_mm, kind=kind, turn=turn, settings=settings)
+                Stop(
+                    gap_mm=route.gaps_mm[index],
+                    kind=kind,
+                    turn=turn,
+                    settings=here | settings,
+                )
                 for settings in _settings(route.scans)
             ]
     if route.baseline:
@@ -90,13 +99,15 @@ def stops_of(route: Route) -> tuple[Stop, ...]:
     return tuple(stops)
 
 
-def _turn(route: Route) -> Iterator[tuple[StopKind, float]]:
+def _turn(route: Route) -> Iterator[tuple[StopKind, int]]:
+    """Yield the kind and the index of the gap of each stop of one turn."""
     out: StopKind = "free" if route.order == "free" else "approach"
-    for gap_mm in route.gaps_mm:
-        yield out, gap_mm
+    count = len(route.gaps_mm)
+    for index in range(count):
+        yield out, index
     if route.sweep == "return":  # the nearest is not taken twice
-        for gap_mm in list(route.gaps_mm)[-2::-1]:
-            yield "return", gap_mm
+        for index in range(count - 2, -1, -1):
+            yield "return", index
 
 
 def _settings(scans: Mapping[str, Sequence[float]]) -> Iterator[dict[str, float]]:

@@ -8,6 +8,7 @@ from .curves import polyline as polyline
 from .curves import spline as spline
 from .figures import draw_passage as draw_passage
 from .figures import film as film
+from .files import lumen_of as lumen_of
 from .files import read_lumen as read_lumen
 from .files import read_poses as read_poses
 from .lumen import Gate as Gate

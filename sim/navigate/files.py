@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -174,6 +175,11 @@ def read_lumen(path: Path) -> Lumen:
         raise
     except InputError as error:
         raise ConfigError(f"{path}: {error}") from None
+
+
+def lumen_of(text: str) -> Lumen:
+    """Return the lumen of the text of a lumen file that was read before."""
+    return LumenModel.model_validate(tomllib.loads(text)).lumen()
 
 
 def read_poses(path: Path) -> list[dict[str, Any]]:

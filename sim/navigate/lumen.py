@@ -103,13 +103,13 @@ class Lumen:
     def pieces(self) -> tuple[str, ...]:
         """Name of the wall of each piece (see `walls`)."""
         return tuple(
-            wall.name for wall in self.walls for _ in _pieces(wall, self._side(wall))
+            wall.name for wall in self.walls for _ in _pieces(wall, self.side_of(wall))
         )
 
     def packed(self, unit_mm: float, depth_mm: float) -> Walls:
         """Return the walls as the kernels take them, in lengths of `unit_mm`."""
         pieces = [
-            piece for wall in self.walls for piece in _pieces(wall, self._side(wall))
+            piece for wall in self.walls for piece in _pieces(wall, self.side_of(wall))
         ]
         return _pack(pieces, unit_mm, depth_mm / unit_mm)
 
@@ -125,7 +125,7 @@ class Lumen:
         size(side_mm, "side_mm", "mm")
         _check_width(self, side_mm)
         chains = [
-            _Piece([(arc, self._side(wall)) for arc in wall.arcs], wall.closed, False)
+            _Piece([(arc, self.side_of(wall)) for arc in wall.arcs], wall.closed, False)
             for wall in self.walls
         ]
         walls = _pack(chains, 1.0, 1e9)
@@ -139,7 +139,28 @@ class Lumen:
                 f"{where}, {room_mm:.4g} mm from it"
             )
 
-    def _side(self, wall: Wall) -> float:
+    def rooms_mm(self, points_mm: Array) -> dict[str, Array]:
+        """Return the signed distances of points from each wall, by its name.
+
+        Parameters
+        ----------
+        points_mm : ndarray, shape (n, 2)
+            In the lumen's frame.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (n,)
+            In mm; negative behind the wall.
+        """
+        points = np.ascontiguousarray(points_mm, dtype=float)
+        return {
+            wall.name: clearances(
+                _pack(_pieces(wall, self.side_of(wall)), 1.0, 1e9), points
+            )
+            for wall in self.walls
+        }
+
+    def side_of(self, wall: Wall) -> float:
         """Return +1 if the lumen is to the left of the wall, else -1."""
         chain = [(arc, 1.0) for arc in wall.arcs]
         walls = _pack([_Piece(chain, wall.closed, False)], 1.0, 1e9)
@@ -306,7 +327,7 @@ def _check_width(lumen: Lumen, side_mm: float) -> None:
                     points = points[away]
             if not len(points):
                 continue
-            own = [(arc, lumen._side(wall)) for arc in wall.arcs]
+            own = [(arc, lumen.side_of(wall)) for arc in wall.arcs]
             walls = _pack([_Piece(own, wall.closed, True, True)], 1.0, 1e9)
             width_mm = clearances(walls, points)
             k = int(np.argmin(width_mm))

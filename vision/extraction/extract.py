@@ -75,7 +75,7 @@ def measure(photo: Photo, setting: Setting) -> Measurement:
             photo = oriented(photo, setting.calibration)
             setting.calibration.check_size(*photo.size_px)
         if setting.bare is not None:
-            photo = flattened(photo, setting.bare)
+            photo = flattened(photo, setting.bare, setting.guide_px)
         return _measure(photo, setting)
     except LostError as lost:
         refused = failure(lost.flag, lost.reason)

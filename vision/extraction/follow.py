@@ -86,7 +86,7 @@ def _near(photo: Photo, setting: Setting, last: Measurement) -> Measurement | No
         photo = oriented(photo, setting.calibration)
         setting.calibration.check_size(*photo.size_px)
     if setting.bare is not None:
-        photo = flattened(photo, setting.bare)
+        photo = flattened(photo, setting.bare, setting.guide_px)
     view = mixed(photo, last.mix, -1.0 if last.inverted else 1.0)
     for reach in REACHES:
         try:

@@ -50,6 +50,9 @@ class Setting:
         looks over the clamp so that it hides the root (flag ``root_hidden``).
     bare : Photo or None
         The same scene without rod and clamp: its light is divided out.
+    guide_px : tuple of tuple of float
+        Corners of the guide that a rod slides out of: `bare` is an empty channel then,
+        and the guide counts as the clamp (`bare.flattened`).
     linear : bool or None
         Whether the values of the files are proportional to light (`read_photo`).
     """
@@ -64,6 +67,7 @@ class Setting:
     clamp: Clamp = "auto"
     clamp_height_mm: float | None = None
     bare: Photo | None = None
+    guide_px: tuple[tuple[float, float], ...] = ()
     linear: bool | None = None
 
     @property

@@ -23,6 +23,9 @@ from .parts import (
     Mark as Mark,
 )
 from .parts import (
+    Ridge as Ridge,
+)
+from .parts import (
     Rod as Rod,
 )
 from .parts import (

@@ -6,6 +6,7 @@ Coverage is exact (`raster`); pictures are (h, w, 3), linear blue, green, red.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import cv2
 import numpy as np
@@ -14,7 +15,8 @@ from numpy.typing import NDArray
 from ..camera.calibration import Calibration
 from ..edge.wall_light import reflectance
 from ..picture.raster import coverage, coverage_of, strip
-from .parts import INK, PAPER, Block, Colour, Label, Mark, Rod, SceneLight
+from .parts import INK, PAPER, Block, Colour, Label, Mark, Ridge, Rod, SceneLight
+from .ridges import ridge_faces, ridge_shade, ridge_tops
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.float32]
@@ -105,8 +107,29 @@ def rod_shadow(rod: Rod, camera: Calibration, light: SceneLight) -> Picture:
     return _soften(sharp, light.softness * height / _scale(camera))
 
 
-def draw_rod(picture: Picture, rod: Rod, camera: Calibration, gloss: float) -> None:
-    """Draw the walls, then the top face: each a stack of outlines at their heights."""
+def ridge_walls(ridges: Sequence[Ridge], camera: Calibration) -> Picture:
+    """Return where the faces of ridges are seen beside their tops."""
+    return _beside(ridge_faces(ridges, camera), ridge_tops(ridges, camera))
+
+
+def ridges_shadow(
+    ridges: Sequence[Ridge], camera: Calibration, light: SceneLight
+) -> Picture:
+    """Return where ridges keep the lamp's light from the paper, from 0 to 1."""
+    height = max(ridge.height_mm for ridge in ridges)
+    sharp = ridge_shade(ridges, camera, _shadow_shift(light, 1.0))
+    return _soften(sharp, light.softness * height / _scale(camera))
+
+
+def draw_rod(
+    picture: Picture, rod: Rod, camera: Calibration, gloss: float,
+    over: Picture | None = None,
+) -> None:  # fmt: skip
+    """Draw the walls, then the top face: each a stack of outlines at their heights.
+
+    `over` is what will be laid beside it later: of a pixel that both share nothing else
+    is to be seen.
+    """
     size = camera.image_size_px
     levels = rod.pose.height_mm + rod.side_mm * np.linspace(-0.5, 0.5, 5)
     walls = np.zeros(picture.shape[:2], dtype=np.float32)
@@ -115,6 +138,8 @@ def draw_rod(picture: Picture, rod: Rod, camera: Calibration, gloss: float) -> N
     top = coverage(_seen(rod, camera, levels[-1]), *size)
     np.maximum(walls, top, out=walls)
     walls = _beside(walls, top)
+    if over is not None:
+        top = np.minimum(1.0, top / np.maximum(1.0 - over, np.float32(1e-3)))
     mirrored = SHEEN * walls * _mirroring(rod, camera)
     seen = mirrored[..., None] * picture
     paint(picture, walls, scaled(rod.colour, WALL_SKY))

@@ -34,6 +34,8 @@ RUBBER: Colour = (0.048, 0.048, 0.048)
 
 INK: Colour = (0.035, 0.035, 0.035)
 
+PRINT: Colour = (0.40, 0.38, 0.36)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Block:
@@ -190,6 +192,26 @@ class Mark:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Ridge:
+    """A wall of a printed channel, standing on the paper.
+
+    Parameters
+    ----------
+    face_mm, back_mm : ndarray, shape (n, 2)
+        Along the face that the rod may touch, and behind it, on the board.
+    height_mm : float
+        Above the paper.
+    colour : tuple of float
+        Reflectance in blue, green, red, from 0 to 1.
+    """
+
+    face_mm: Array
+    back_mm: Array
+    height_mm: float = 1.4
+    colour: Colour = PRINT
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
     """What lies on the paper.
 
@@ -218,6 +240,8 @@ class Scene:
         What is printed or drawn on the paper, or falls on it.
     others : tuple of Rod
         Other rods beside the one in the clamp.
+    ridges : tuple of Ridge
+        Walls of a channel, of one colour.
     """
 
     clamp: Block
@@ -232,6 +256,7 @@ class Scene:
     rod_stripe: Colour | None = None
     marks: tuple[Mark, ...] = ()
     others: tuple[Rod, ...] = ()
+    ridges: tuple[Ridge, ...] = ()
 
     @property
     def rods(self) -> tuple[Rod, ...]:

@@ -28,11 +28,14 @@ from .drawing import (
     draw_rod,
     draw_top,
     paint,
+    ridge_walls,
+    ridges_shadow,
     rod_shadow,
     scaled,
     subdivide,
 )
 from .parts import INK, PAPER, Block, Colour, Scene, SceneLight
+from .ridges import ridge_tops
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.float32]
@@ -88,13 +91,22 @@ def paint_scene(scene: Scene, camera: Calibration) -> Picture:
         shade = np.maximum(shade, block_shadow(block, camera, light))
     for rod in scene.rods:
         shade = np.maximum(shade, rod_shadow(rod, camera, light))
+    if scene.ridges:
+        shade = np.maximum(shade, ridges_shadow(scene.ridges, camera, light))
     picture *= (1.0 - light.shadow_depth * shade)[..., None]
     for block in blocks:
         paint(picture, block_walls(block, camera), scaled(block.colour, 0.72))
+    tops = None
+    if scene.ridges:
+        tops = ridge_tops(scene.ridges, camera)
+        faces = ridge_walls(scene.ridges, camera)
+        paint(picture, faces, scaled(scene.ridges[0].colour, 0.72))
     for rod in scene.rods:
-        draw_rod(picture, rod, camera, light.gloss)
+        draw_rod(picture, rod, camera, light.gloss, tops)
     for block in blocks:
         draw_top(picture, block, camera)
+    if tops is not None:
+        paint(picture, tops, scene.ridges[0].colour)
     return picture
 
 

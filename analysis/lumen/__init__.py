@@ -1,0 +1,1 @@
+"""A rod photographed in a printed channel: where it lies, where it touches."""
