@@ -1,26 +1,34 @@
-"""Time the planar simulator beside scipy's boundary value solver and PyElastica.
+"""Time the planar simulator: single calls, batches, paths, first calls, commands.
 
-Run by hand: ``python benchmarks/bench_sim.py [--elastica]``. All times are processor
-time, the best of several runs, so that they mean something on a busy machine.
+    python benchmarks/bench_sim.py
+
+All times are processor time, the best of several runs, so that they mean something on a
+busy machine. `bench_peers.py` sets other people's solvers beside it.
 """
 
 from __future__ import annotations
 
 import math
+import os
 import resource
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 
 import numpy as np
-from scipy.integrate import solve_bvp
 
 from magbend.core.magnet import Magnet
-from magbend.core.units import MU0
 from magbend.sim import (
+    Coil,
+    Cuboid,
+    Cylinder,
+    Field,
     MagnetField,
+    Uniform,
     UniformField,
+    follow_path,
     gmc,
     sensitivities,
     solve,
@@ -37,6 +45,13 @@ COMMANDS = (
     "sim equilibria --gmc 2",
     "sim magnet",
 )
+FIRST = {
+    "solve": "solve(gmc(2), UniformField(flux_mT=50.0))",
+    "solve_spatial": "solve_spatial(gmc(2), UniformField(flux_mT=50.0))",
+    "solve_many": "solve_many({'length_mm': [[10.0]] * 1000, 'E_MPa': [[10.0]] * 1000,"
+    " 'side_mm': 1.0, 'remanence_mT': 20.0, 'flux_mT': 50.0})",
+}
+"""Calls that a new session makes first."""
 TIP = np.array([29.5353236353478, 4.70952405678937])
 CUBE = Magnet.cube(55.0, 1.305)
 
@@ -52,32 +67,6 @@ def cost(call: Callable[[], object], runs: int, times: int = 7) -> float:
     return float(best)
 
 
-def boundary_value_problem() -> np.ndarray:
-    """GMC 2 at 50 mT, 90 deg, by solve_bvp on its three sections side by side."""
-    E, length, side = np.array([20e6, 15e6, 10e6]), 0.01, 1e-3
-    load = side**2 * 20.07e-3 / MU0 * 50e-3
-    EI = E * side**4 / 12.0
-
-    def slope(_t: np.ndarray, y: np.ndarray) -> np.ndarray:
-        theta, moment = y[0:3], y[3:6]
-        return np.vstack(
-            [
-                length * moment / EI[:, None],
-                -length * load * np.cos(theta),
-                length * np.cos(theta),
-                length * np.sin(theta),
-            ]
-        )
-
-    def ends(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        joints = [b[i] - a[i + 1] for i in (0, 1, 3, 4, 6, 7, 9, 10)]
-        return np.array([a[0], a[6], a[9], b[5], *joints])
-
-    mesh = np.linspace(0.0, 1.0, 11)
-    found = solve_bvp(slope, ends, mesh, np.zeros((12, 11)), tol=1e-6)
-    return 1e3 * np.array([found.y[8, -1], found.y[11, -1]])
-
-
 def designs(n: int) -> dict[str, np.ndarray]:
     rng = np.random.default_rng(0)
     rods = [gmc(int(k)) for k in rng.integers(1, 8, n)]
@@ -89,7 +78,7 @@ def designs(n: int) -> dict[str, np.ndarray]:
     }
 
 
-def single_calls() -> float:
+def single_calls() -> None:
     field, magnet = UniformField(flux_mT=50.0), MagnetField(magnet=CUBE, gap_mm=60.0)
     rod = gmc(2)
     line = solve(rod, field).centreline
@@ -101,7 +90,6 @@ def single_calls() -> float:
         f"solve, uniform field         {uniform * 1e6:8.1f} us   error {error:.1e} mm"
     )
     print(f"solve, cube magnet           {cube * 1e6:8.1f} us")
-    return uniform
 
 
 def derivatives() -> None:
@@ -140,6 +128,64 @@ def batches(n: int = 100_000) -> None:
         )
 
 
+def sums(n: int = 5000) -> None:
+    """Fields of sources, in units of the one magnet that `solve_many` has lanes for."""
+    cube = Cuboid(sides_mm=55.0, remanence_T=1.305)
+    cylinder = Cylinder(diameter_mm=40.0, length_mm=30.0, remanence_T=1.3)
+    coil = Coil(diameter_mm=80.0, current_A=5.0, turns=200, centre_mm=(0.0, -40.0, 0.0))
+    fields = {
+        "a cuboid": Field(cube),
+        "a cylinder": Field(cylinder),
+        "cuboid and uniform": Field(cube, Uniform(flux_mT=-2.0)),
+        "cuboid, coil, uniform": Field(cube, coil, Uniform(flux_mT=-2.0)),
+    }
+    rod, rods = gmc(2), designs(n) | {"gap_mm": 60.0}
+    one = cost(lambda: solve(rod, MagnetField(magnet=CUBE, gap_mm=60.0)), 200)
+    each = cost(lambda: solve_many(rods, magnet=CUBE, threads=1), 1) / n
+    for name, field in fields.items():
+        near = field.at_gap(60.0)
+        single = cost(lambda f=near: solve(rod, f), 200)
+        many = cost(lambda f=field: solve_many(rods, magnet=f, threads=1), 1) / n
+        print(
+            f"{name:22} solve {single * 1e6:5.1f} us, ratio {single / one:.2f}; "
+            f"solve_many {many * 1e6:5.1f} us, ratio {many / each:.1f}"
+        )
+
+
+def paths() -> None:
+    """A path toward the cube and back, and one of a turning field that snaps."""
+    cube = Field(Cuboid(sides_mm=55.0, remanence_T=1.305))
+    turned = Field(Uniform(flux_mT=420.0))
+    for name, field, way in (
+        ("gap 120:30:120 mm", cube, {"gap_mm": (120.0, 30.0, 120.0)}),
+        ("angle 100:260:100 deg", turned, {"angle_deg": (100.0, 260.0, 100.0)}),
+    ):
+        path = follow_path(gmc(2), field, **way)
+        each = cost(lambda f=field, w=way: follow_path(gmc(2), f, **w), 1)
+        points = len(path.points)
+        base = cost(lambda f=field.at_gap(60.0): solve(gmc(2), f), 100)
+        print(
+            f"path, {name:22} {each * 1e3:6.1f} ms, {points} points, "
+            f"{each / points / base:.1f} solves a point, {len(path.folds)} folds"
+        )
+
+
+def first_calls() -> None:
+    """The first call of a session, where nothing is compiled yet."""
+    for name, call in FIRST.items():
+        code = (
+            "import time; start = time.process_time()\n"
+            f"from magbend.sim import gmc, UniformField, {name}\n"
+            f"{call}\nprint(time.process_time() - start)"
+        )
+        with tempfile.TemporaryDirectory() as empty:
+            told = subprocess.run(
+                [sys.executable, "-c", code], check=True, capture_output=True,
+                text=True, env=os.environ | {"NUMBA_CACHE_DIR": empty},
+            ).stdout  # fmt: skip
+        print(f"first {name}, imports and all {float(told):6.2f} s")
+
+
 def processor_ms(arguments: list[str], runs: int = 7) -> float:
     """Processor time of a whole process, children and all, the best of some runs."""
     best = math.inf
@@ -161,61 +207,14 @@ def start_up() -> None:
         print(f"{whole:6.0f} ms, ratio {whole / base:.2f}: magbend {typed}")
 
 
-def elastica(ours: float) -> None:
-    """PyElastica, damped dynamics until 0.25 s, 60 elements."""
-    import elastica as ea
-
-    class Simulator(ea.BaseSystemCollection, ea.Constraints, ea.Forcing, ea.Damping):
-        pass
-
-    system = Simulator()
-    n, length, side = 60, 0.03, 1e-3
-    rod = ea.CosseratRod.straight_rod(
-        n, np.zeros(3), np.array([1.0, 0, 0]), np.array([0, 1.0, 0]), length,
-        np.sqrt(side**2 / np.pi), 2640.0, youngs_modulus=15e6, shear_modulus=5e6,
-    )  # fmt: skip
-    # A square of the same area is stiffer by pi / 3 than the circle.
-    for first, E in ((0, 20e6), (20, 15e6), (40, 10e6)):
-        rod.bend_matrix[..., first : first + 20] *= E / 15e6 * np.pi / 3.0
-    system.append(rod)
-    system.constrain(rod).using(
-        ea.OneEndFixedBC, constrained_position_idx=(0,), constrained_director_idx=(0,)
-    )
-    load = side**2 * 20.07e-3 / MU0 * 50e-3
-    system.add_forcing_to(rod).using(
-        ea.EndpointForces, np.zeros(3), np.array([0, load, 0.0]), ramp_up_time=1e-3
-    )
-    step = 1.7e-6
-    system.dampen(rod).using(
-        ea.AnalyticalLinearDamper, uniform_damping_constant=150.0, time_step=step
-    )
-    system.finalize()
-    start = time.process_time()
-    t = 0.0
-    stepper = ea.PositionVerlet()
-    for _ in range(int(0.25 / step)):
-        t = stepper.step(system, t, step)
-    theirs = time.process_time() - start
-    error = abs(rod.position_collection[1, -1] * 1e3 - TIP[1])
-    print(
-        f"PyElastica, 0.25 s           {theirs * 1e6:8.0f} us   error {error:.1e} mm"
-        f"   ratio {theirs / ours:.0f}"
-    )
-
-
 def main() -> None:
-    ours = single_calls()
-    error = np.abs(boundary_value_problem() - TIP).max()
-    theirs = cost(boundary_value_problem, 10)
-    print(
-        f"scipy solve_bvp, tol 1e-6    {theirs * 1e6:8.1f} us   error {error:.1e} mm"
-        f"   ratio {theirs / ours:.0f}"
-    )
+    single_calls()
+    sums()
     derivatives()
     batches()
+    paths()
+    first_calls()
     start_up()
-    if "--elastica" in sys.argv:
-        elastica(ours)
 
 
 if __name__ == "__main__":
