@@ -10,7 +10,8 @@ section's compliances e (bending), t (stretch) and g (shear),
     eps    = t N + alpha rho (e q)^2 / 2,    gamma = g Q
     q'     = -Q (1 + eps) + gamma N,         r' = -(1 + eps) t - gamma n
 
-A rod is an array (n, 13), tip first, with the columns named below; `JOINT` is the turn
+A rod is an array (n, 14), tip first, with the columns named below; `DEEP` is where off
+the plane the Gauss points of its end face are, `JOINT` the turn
 of the section per curvature of the softer side at the joint towards the root, in
 lengths of L, `SOFT` the compliance of that softer side. The base is (turn, shift,
 largest load): turn and shift per root curvature, and the load that sets the length of
@@ -26,8 +27,8 @@ import numpy as np
 from ...core.jit import njit
 from ..magnet.flux import flux_at, is_uniform
 
-H, E, M, WX, WY, T, G, ALPHA, RHO, CHI, SIDE, JOINT, SOFT = range(13)
-WIDTH = 13
+H, E, M, WX, WY, T, G, ALPHA, RHO, CHI, SIDE, DEEP, JOINT, SOFT = range(14)
+WIDTH = 14
 SERIES = 11
 """Series of a step: theta, q, sin, cos, theta', eps, Q, g N - eps,
 alpha t N + chi (e q)^2, and the increments of x and y."""
@@ -115,11 +116,11 @@ def _load(rod, field, load, u, X, b):  # type: ignore[no-untyped-def]
     if is_uniform(field):
         fx, fy = m * field[1], m * field[2]
     else:
-        a = rod[0, SIDE] / math.sqrt(12.0)
+        a = math.sqrt(rod[0, RHO])
         nx, ny = -math.sin(u[0] + u[3]) * a, math.cos(u[0] + u[3]) * a
         fx = fy = 0.0
         for side in (-1.0, 1.0):
-            flux_at(field, u[1] + side * nx, u[2] + side * ny, a, b)
+            flux_at(field, u[1] + side * nx, u[2] + side * ny, rod[0, DEEP], b)
             fx += 0.5 * m * b[0]
             fy += 0.5 * m * b[1]
             X[1] -= 0.5 * m * side * (nx * b[1] - ny * b[0])

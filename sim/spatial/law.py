@@ -13,6 +13,8 @@ where r_i^2 is the stiffness of k_i over that of e. Dimensionless as `spatial.ma
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ...core.jit import njit
@@ -20,11 +22,12 @@ from ..magnet.flux import flux_at
 
 (
     T, G1, G2, BEND, TWIST, STRETCH, R1, R2, R3,
-    P11, P22, P12, P13, P23, S1, S2, FACE1, FACE2,
-) = range(13, 31)  # fmt: skip
+    P11, P22, P12, P13, P23, S1, S2, FACE1, FACE2, SHARE,
+) = range(13, 32)  # fmt: skip
 """Compliances of stretch and shear; alpha of bending and torsion; `NU`; r_i^2; P; S;
-and where along d1 and d2 the four Gauss points of the end face are."""
-SOLID_WIDTH = 31
+where along d1 and d2 the four Gauss points of the end face are; and the first of three
+shares of the section's own compliances that an end of it has."""
+SOLID_WIDTH = 34
 _C1, _WX = 1, 10
 """Where a row's three compliances and its weight begin, as in `march`."""
 
@@ -67,6 +70,46 @@ def strains(p, y, v, H):  # type: ignore[no-untyped-def]
     H[2, 5] = H[5, 2] = p[TWIST] * p[T] * k2
     H[3, 3], H[4, 4] = p[G1], p[G2]
     H[5, 5] = p[T] * (1.0 + p[STRETCH] * e)
+
+
+@njit(cache=True)
+def axis(rows, states, directors, curvature):  # type: ignore[no-untyped-def]
+    """Write directors whose third is the tangent of the axis, and their curvature.
+
+    Parameters
+    ----------
+    rows : ndarray, shape (n, 34)
+        The section at each station.
+    states : ndarray, shape (n, 18)
+        The state there, as of `march`.
+    directors, curvature : ndarray, shapes (n, 3, 3) and (n, 3)
+        The sections tilt against the axis by the shear, which counts to first order.
+        At an end of a section the curvature is what it tends to.
+    """
+    v, H = np.empty(6), np.empty((7, 6))
+    for k in range(rows.shape[0]):
+        p, y = rows[k], states[k]
+        strains(p, y, v, H)
+        a, c = v[3] / (1.0 + v[5]), v[4] / (1.0 + v[5])
+        for i in range(3):
+            d1, d2, d3 = y[3 * i], y[3 * i + 1], y[3 * i + 2]
+            directors[k, 0, i] = d1 - a * d3
+            directors[k, 1, i] = d2 - c * d3
+            directors[k, 2, i] = d3 + a * d1 + c * d2
+        for j in range(3):
+            size = math.sqrt(np.sum(directors[k, j] ** 2))
+            directors[k, j] /= size
+        # d(Q)/ds = -omega x n - weight, in body components
+        q0 = v[2] * H[6, 1] - v[1] * H[6, 2]
+        q1 = v[0] * H[6, 2] - v[2] * H[6, 0]
+        for i in range(3):
+            q0 -= p[_WX + i] * y[3 * i]
+            q1 -= p[_WX + i] * y[3 * i + 1]
+        for i in range(3):
+            v[i] /= p[SHARE + i]
+        curvature[k, 0] = v[0] - a * v[2] - p[G2] * q1
+        curvature[k, 1] = v[1] - c * v[2] + p[G1] * q0
+        curvature[k, 2] = v[2] + a * v[0] + c * v[1]
 
 
 @njit(cache=True)

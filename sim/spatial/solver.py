@@ -38,7 +38,9 @@ from ..magnet.flux import UNIFORM, WIDTH, flux_at
 from ..planar.contact import load_before_touching, touches
 from ..scaling import MOST_POINTS, field_array, stations
 from ..solution import Solution
+from .law import axis
 from .march import AXIAL, C1, C3, K1, K3, MU1, MU2, WX, WY, WZ, H
+from .march import WIDTH as WIDE
 from .newton import shape, solve_pose
 from .rod import SpatialRod, SpatialSection, Vector, rod_table
 
@@ -185,7 +187,28 @@ def solve_spatial(
         )
     points = whole(points, 2, MOST_POINTS, "points")
     rod, table, margin = _held(rod, support)
-    L = rod.length_mm
+    unit_Nmm = rod.sections[0].stiffness_Nmm2[1] / rod.length_mm
+    return solve_table(table, margin, rod.length_mm, unit_Nmm, field, support, points)
+
+
+def solve_table(
+    table: Array, margin: float, length_mm: float, unit_Nmm: float,
+    field: Field | Sequence[float], support: Support, points: int,
+) -> SpatialSolution:  # fmt: skip
+    """Return the equilibrium of a rod as the kernels take it, tip first.
+
+    Parameters
+    ----------
+    table : ndarray, shape (n, 13) or wider
+        As of `rod_table`; wider, of a solid (`law`).
+    margin : float
+        Half its largest side over its length.
+    length_mm, unit_Nmm : float
+        Its length, and its unit of moments.
+    field, support, points
+        As of `solve_spatial`.
+    """
+    L = length_mm
     flux = _flux_array(field, L)
     angle = rad_from_deg(support.clamp_angle_deg)
     cos, sin = math.cos(angle), math.sin(angle)
@@ -211,7 +234,7 @@ def solve_spatial(
     if not _is_vector(field):
         x, y, z = states[:, 12:15].T
         refuse_outside(as_field(field), x, y, L, z)
-    return _solution(rod, table, flux, s, states, index, error)
+    return _solution(table, L, unit_Nmm * 1e-3, flux, s, states, index, error)
 
 
 def _unloaded(table: Array, clamp: Array, s: Array) -> Array:
@@ -314,16 +337,18 @@ def _flux_mT(flux: Array, point: Array) -> Vector:
 
 
 def _solution(
-    rod: SpatialRod, table: Array, flux: Array, s: Array, states: Array,
+    table: Array, L: float, unit_Nm: float, flux: Array, s: Array, states: Array,
     index: int, error: float,
 ) -> SpatialSolution:  # fmt: skip
-    L = rod.length_mm
     directors = states[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1)
-    joints = np.cumsum([part.length_mm for part in rod.sections])[:-1] / L
-    row = table[::-1][np.searchsorted(joints, s, side="right")]
-    curvature = states[:, 9:12] * row[:, C1 : C3 + 1] + row[:, K1 : K3 + 1]
-    unit_Nm = rod.sections[0].stiffness_Nmm2[1] / L * 1e-3
     moment = directors[0].T @ states[0, 9:12] * unit_Nm
+    joints = np.cumsum(table[::-1, H])[:-1]
+    row = table[::-1][np.searchsorted(joints, s, side="right")]
+    if table.shape[1] > WIDE:
+        directors, curvature = np.empty((len(s), 3, 3)), np.empty((len(s), 3))
+        axis(row, states, directors, curvature)
+    else:
+        curvature = states[:, 9:12] * row[:, C1 : C3 + 1] + row[:, K1 : K3 + 1]
     return SpatialSolution(
         s_mm=s * L,
         r_mm=states[:, 12:15] * L,
