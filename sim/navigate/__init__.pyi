@@ -11,6 +11,9 @@ from .figures import film as film
 from .files import lumen_of as lumen_of
 from .files import read_lumen as read_lumen
 from .files import read_poses as read_poses
+from .in_tube import SpatialContact as SpatialContact
+from .in_tube import SpatialPassage as SpatialPassage
+from .in_tube import SpatialStep as SpatialStep
 from .lumen import Gate as Gate
 from .lumen import Lumen as Lumen
 from .lumen import Wall as Wall

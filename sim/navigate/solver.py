@@ -9,11 +9,13 @@ from ...core.checks import finite, listed, shown, size, whole, within
 from ...core.errors import InputError, SolverError
 from ...core.specimen import Specimen
 from ..fields import Support, check_case
+from ..tube.tube import Tube
 from .case import Case, FieldOfWay
+from .in_tube import SpatialPassage, TubeWalk, tube_case
 from .lumen import Lumen
 from .mesh import ELEMENTS, sections_of
 from .passage import Passage
-from .walk import Walk
+from .walk import PlanarWalk
 
 NO_SUPPORT = Support()
 MOST_STEPS = 20_000
@@ -24,7 +26,7 @@ DEEP = 3.0
 
 def navigate(
     specimen: Specimen,
-    lumen: Lumen,
+    lumen: Lumen | Tube,
     field: FieldOfWay,
     *,
     way_mm: float | Sequence[float] | None = None,
@@ -42,9 +44,10 @@ def navigate(
     ----------
     specimen : Specimen
         The rod; the largest of its sides is its thickness everywhere.
-    lumen : Lumen
-        Walls, entry, and whether the rod is fed or pushed. Its frame is the specimen's:
-        a magnet's gap counts from the point (length of the rod, 0).
+    lumen : Lumen or Tube
+        Walls, entry, and whether the rod is fed or pushed; or a tube in space, into
+        which it is fed. The frame is the specimen's: a magnet's gap counts from the
+        point (length of the rod, 0).
     field : UniformField, MagnetField or callable
         What bends the rod; or a function of the insertion in mm that returns it.
     way_mm : float or sequence of float, optional
@@ -53,9 +56,10 @@ def navigate(
     step_mm : float
         Step of the insertion, in mm; where the rod snaps it is refined by itself.
     friction : float
-        Coefficient of Coulomb friction along the wall; it acts on the rod's axis.
+        Coefficient of Coulomb friction along the wall; it acts on the rod's axis. 0 in
+        a tube.
     support : Support
-        Weight within the plane, and a factor on the magnetic load.
+        Weight, in a planar lumen within the plane; and a factor on the magnetic load.
     push_limit_N : float
         Push force at which one gives up, in N.
     elements : int
@@ -70,7 +74,8 @@ def navigate(
     Returns
     -------
     Passage
-        Every step, what happened on the way, and how it ended.
+        Every step, what happened on the way, and how it ended; of a tube a
+        `SpatialPassage`.
 
     Raises
     ------
@@ -90,30 +95,35 @@ def navigate(
     'inserted'
     """
     check_case(specimen, field(0.0) if callable(field) else field, support)
-    _check_plane(field, support)
-    if not isinstance(lumen, Lumen):
-        raise InputError(
-            f"lumen must be a Lumen, as channel(...) is; instead received "
-            f"{shown(lumen)}"
-        )
-    lumen.check_rod(max(specimen.sides_mm))
-    case = Case(
-        specimen=specimen,
-        lumen=lumen,
-        field=field,
-        sections=sections_of(specimen, support),
-        walls=lumen.packed(specimen.length_mm, DEEP * max(specimen.sides_mm)),
-        pieces=lumen.pieces,
-        friction=within(friction, 0.0, 2.0, "friction", ""),
-        elements=whole(elements, 2, 400, "elements"),
-        tip=tip,
-    )
+    _check_clamp(support)
+    friction = within(friction, 0.0, 2.0, "friction", "")
+    elements = whole(elements, 2, 400, "elements")
+    limit_N = _limit(push_limit_N)
     step_mm = within(
         size(step_mm, "step_mm", "mm"), specimen.length_mm / MOST_STEPS, 1e9,
         "step_mm", "mm",
     )  # fmt: skip
-    walk = Walk(case, step_mm, _limit(push_limit_N))
-    for target_mm in _way(way_mm, case):
+    walk: PlanarWalk | TubeWalk
+    if isinstance(lumen, Tube):
+        _check_tube(lumen, friction, tip)
+        made = tube_case(specimen, lumen, field, support, elements)
+        walk = TubeWalk(made, step_mm, limit_N)
+    else:
+        _check_plane(lumen, field, support)
+        lumen.check_rod(max(specimen.sides_mm))
+        case = Case(
+            specimen=specimen,
+            lumen=lumen,
+            field=field,
+            sections=sections_of(specimen, support),
+            walls=lumen.packed(specimen.length_mm, DEEP * max(specimen.sides_mm)),
+            pieces=lumen.pieces,
+            friction=friction,
+            elements=elements,
+            tip=tip,
+        )
+        walk = PlanarWalk(case, step_mm, limit_N)
+    for target_mm in _way(way_mm, specimen.length_mm):
         if not walk.go_to(target_mm):
             break
     if not walk.steps:
@@ -121,19 +131,19 @@ def navigate(
             f"the first {step_mm:g} mm of {specimen.name!r} in lumen {lumen.name!r} "
             f"have no equilibrium ({walk.outcome}); try another entry or a weaker field"
         )
-    return Passage(
+    record = SpatialPassage if isinstance(lumen, Tube) else Passage
+    return record(
         lumen=lumen.name,
         specimen=specimen.name,
         outcome=walk.outcome,
-        steps=tuple(walk.steps),
+        steps=tuple(walk.steps),  # type: ignore[arg-type]
         events=tuple(walk.events),
         error_mm=walk.error_mm() if refine else math.nan,
     )
 
 
-def _way(way_mm: object, case: Case) -> tuple[float, ...]:
+def _way(way_mm: object, longest_mm: float) -> tuple[float, ...]:
     """Return the insertions to go to."""
-    longest_mm = case.length_mm
     given = (longest_mm,) if way_mm is None else listed(way_mm) or (way_mm,)
     least = 1e-3 * longest_mm
     return tuple(within(w, least, longest_mm, "way_mm", "mm") for w in given)  # type: ignore[arg-type]
@@ -145,8 +155,27 @@ def _limit(push_limit_N: float) -> float:
     return size(finite(push_limit_N, "push_limit_N", "N"), "push_limit_N", "N")
 
 
-def _check_plane(field: FieldOfWay, support: Support) -> None:
-    """Refuse what would lift the rod out of the plane of the lumen."""
+def _check_tube(tube: Tube, friction: float, tip: object) -> None:
+    """Refuse what only a planar lumen has."""
+    if friction:
+        raise InputError(
+            f"friction must be 0 in tube {tube.name!r}: only planar lumens have it; "
+            f"instead received {friction:g}"
+        )
+    if tip is not None:
+        raise InputError(
+            f"tip must be None in tube {tube.name!r}: only planar lumens hold a tip; "
+            f"instead received {shown(tip)}"
+        )
+
+
+def _check_plane(lumen: object, field: FieldOfWay, support: Support) -> None:
+    """Refuse what is no lumen, or would lift the rod out of its plane."""
+    if not isinstance(lumen, Lumen):
+        raise InputError(
+            "lumen must be a Lumen, as channel(...) is, or a Tube; instead received "
+            f"{shown(lumen)}"
+        )
     first = field(0.0) if callable(field) else field
     if not first.in_plane:
         raise InputError(
@@ -158,8 +187,11 @@ def _check_plane(field: FieldOfWay, support: Support) -> None:
             "gravity_m_s2 must be within the plane of the lumen, z 0; instead received "
             f"{support.gravity_m_s2[2]:g} m/s2: a floor would carry it"
         )
+
+
+def _check_clamp(support: Support) -> None:
     if support.clamp_angle_deg != 0.0:
         raise InputError(
-            "clamp_angle_deg must be 0 in a lumen, whose entry_angle_deg tells the "
-            f"direction; instead received {support.clamp_angle_deg:g} deg"
+            "clamp_angle_deg must be 0 in a lumen, whose entry tells the direction; "
+            f"instead received {support.clamp_angle_deg:g} deg"
         )

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,40 @@ EASE = 1e-3
 SOFTEST = 1e2
 """Stiffness of the walls where a rod that snaps is to find its way past them."""
 WHY = {NO_ROOM: JAMMED, PULLED: PULLED_ON}
+
+
+class AtRest(Protocol):
+    """What a walk asks of a rod at rest."""
+
+    insertion_mm: float
+    energy: float
+    rubbed: float
+    moved: float
+    push: float
+
+
+class OfCase(Protocol):
+    """What a walk asks of its case; see `case.Case`."""
+
+    tip: tuple[float, float, float] | None
+
+    @property
+    def length_mm(self) -> float:
+        """Unit of lengths, in mm."""
+        ...
+
+    @property
+    def unit_N(self) -> float:
+        """Unit of forces, in N."""
+        ...
+
+    def flux(self, insertion_mm: float) -> Array:
+        """Return the field at an insertion."""
+        ...
+
+
+S = TypeVar("S", bound=AtRest)
+C = TypeVar("C", bound=OfCase)
 
 
 @dataclass(slots=True)
@@ -142,18 +177,34 @@ def rubbing(touches: Touches, before: Before) -> tuple[Array, Array]:
     return touches.grip[:n] * np.clip(slip / before.ease, -1.0, 1.0), slip
 
 
-class Walk:
+class Walk(ABC, Generic[C, S]):
     """A rod on its way: its state, and what happened."""
 
-    def __init__(self, case: Case, step_mm: float, limit_N: float) -> None:
+    def __init__(self, case: C, step_mm: float, limit_N: float) -> None:
         self.case = case
         self.step_mm = step_mm
         self.limit_N = limit_N
-        self.state: State | None = None
+        self.state: S | None = None
         self.steps: list[Step] = []
         self.events: list[Event] = []
         self.outcome = INSERTED
         self.rubbed = 0.0
+
+    @abstractmethod
+    def _rest(self, old: S | None, insertion_mm: float, soft: float) -> tuple[int, S]:
+        """Return the outcome of coming to rest, and the state; see `at_rest`."""
+
+    @abstractmethod
+    def _read(self, state: S) -> Step:
+        """Give a state its push, and return what a user sees of it."""
+
+    @abstractmethod
+    def _passed(self, before: Step, after: Step) -> list[str]:
+        """Return the names of the gates between two steps."""
+
+    @abstractmethod
+    def error_mm(self) -> float:
+        """Return how far the last shape is from the one on elements half as long."""
 
     def go_to(self, target_mm: float) -> bool:
         """Go to an insertion; return whether it was reached."""
@@ -181,7 +232,7 @@ class Walk:
             step = min(2.0 * step, self.step_mm)
         return True
 
-    def _here(self) -> State:
+    def _here(self) -> S:
         if self.state is None:
             raise RuntimeError("the walk has not begun")
         return self.state
@@ -191,65 +242,48 @@ class Walk:
         first = min(self.step_mm, target_mm)
         if self.case.tip is not None:
             first = target_mm
-        outcome, state = at_rest(self.case, None, first, SOFT)
+        outcome, state = self._rest(None, first, SOFT)
         if outcome != SETTLED:
             self.outcome = WHY.get(outcome, LOST)
             return False
         self._arrive(None, state)
         return True
 
-    def _try(self, old: State, goal_mm: float, *, last_try: bool) -> State | None:
+    def _try(self, old: S, goal_mm: float, *, last_try: bool) -> S | None:
         """Return the state at a goal; None if a finer step is needed, or none is."""
-        outcome, new = at_rest(self.case, old, goal_mm, SOFT)
+        outcome, new = self._rest(old, goal_mm, SOFT)
         calm = not self._leaps(old, new)
         if outcome == SETTLED and (calm or last_try):
             return new
         if not last_try:
             return None
-        again, new = at_rest(self.case, old, goal_mm, SOFTEST)
+        again, new = self._rest(old, goal_mm, SOFTEST)
         if again == SETTLED:
             return new
         lost = OVERPOWERED if self.case.flux(goal_mm)[0] != UNIFORM else LOST
         self.outcome = WHY.get(again) or WHY.get(outcome) or lost
         return None
 
-    def _leaps(self, old: State, new: State) -> bool:
+    def _leaps(self, old: S, new: S) -> bool:
         """Return whether a step moves the rod far, and loses energy on the way."""
         taken = (new.insertion_mm - old.insertion_mm) / self.case.length_mm
         lost = self._released(old, new)
         scale = abs(new.energy) + abs(old.energy) + abs(old.push * taken)
         return new.moved > JUMP * abs(taken) and lost > LOSS * scale
 
-    def _released(self, old: State, new: State) -> float:
+    def _released(self, old: S, new: S) -> float:
         """Return the energy that is neither stored, nor rubbed away, nor work."""
         taken = (new.insertion_mm - old.insertion_mm) / self.case.length_mm
         return old.energy + old.push * taken - new.rubbed - new.energy
 
-    def _arrive(self, old: State | None, new: State) -> None:
-        case = self.case
+    def _arrive(self, old: S | None, new: S) -> None:
         self.state = new
         self.rubbed += new.rubbed
-        field = case.flux(new.insertion_mm)
-        load = loads(new.rod, field, new.u, new.touches, new.rubbing, new.held)
-        new.push = push_force(new.rod, field, new.u, load, slides=case.feeds)
-        step = read_step(
-            new.insertion_mm,
-            new.rod,
-            new.u,
-            new.touches,
-            case.pieces,
-            push=new.push,
-            energy=new.energy,
-            rubbed=self.rubbed,
-            overlap=new.overlap,
-            friction=case.friction,
-            length_mm=case.length_mm,
-            unit_N=case.unit_N,
-        )
+        step = self._read(new)
         self._notice(old, new, step)
         self.steps.append(step)
 
-    def _notice(self, old: State | None, new: State, step: Step) -> None:
+    def _notice(self, old: S | None, new: S, step: Step) -> None:
         """Write down what happened in a step."""
         at_mm = new.insertion_mm
         if step.contacts and not any(event.kind == "touch" for event in self.events):
@@ -269,16 +303,50 @@ class Walk:
                     moved_mm=new.moved * self.case.length_mm,
                 )
             )
-        before = self.steps[-1].tip_mm
-        for gate in self.case.lumen.gates:
-            if crosses(gate, before, step.tip_mm):
-                self.events.append(
-                    Event(
-                        kind="gate" if at_mm > old.insertion_mm else "gate back",
-                        insertion_mm=at_mm,
-                        what=gate.name,
-                    )
+        for name in self._passed(self.steps[-1], step):
+            self.events.append(
+                Event(
+                    kind="gate" if at_mm > old.insertion_mm else "gate back",
+                    insertion_mm=at_mm,
+                    what=name,
                 )
+            )
+
+
+class PlanarWalk(Walk[Case, State]):
+    """A rod on its way in the plane."""
+
+    def _rest(
+        self, old: State | None, insertion_mm: float, soft: float
+    ) -> tuple[int, State]:
+        return at_rest(self.case, old, insertion_mm, soft)
+
+    def _read(self, state: State) -> Step:
+        case, rod, u = self.case, state.rod, state.u
+        field = case.flux(state.insertion_mm)
+        load = loads(rod, field, u, state.touches, state.rubbing, state.held)
+        state.push = push_force(rod, field, u, load, slides=case.feeds)
+        return read_step(
+            state.insertion_mm,
+            rod,
+            u,
+            state.touches,
+            case.pieces,
+            push=state.push,
+            energy=state.energy,
+            rubbed=self.rubbed,
+            overlap=state.overlap,
+            friction=case.friction,
+            length_mm=case.length_mm,
+            unit_N=case.unit_N,
+        )
+
+    def _passed(self, before: Step, after: Step) -> list[str]:
+        return [
+            gate.name
+            for gate in self.case.lumen.gates
+            if crosses(gate, before.tip_mm, after.tip_mm)
+        ]
 
     def error_mm(self) -> float:
         """Return how far the last shape is from the one on elements half as long."""

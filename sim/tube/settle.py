@@ -1,0 +1,309 @@
+"""The rod comes to rest in its tube: Newton on an augmented Lagrangian.
+
+The method is that of the plane (`navigate.settle`): Newton's matrix is exact, so that
+its Cholesky factor exists if and only if the state is a minimum; where it does not
+exist bending is added until it does, and at a saddle the way down is found by inverse
+iteration. A trace of bending is always there: a rod that may turn about the axis of a
+straight tube at no cost is at rest.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..magnet.flux import UNIFORM, flux_at
+from .rod import STEP, Rod, Turn, own_energy, turned, within_magnet
+from .slopes import assemble, places, press
+from .touch import FLAT, FLOATS, Seen, Touches, exchange, seen_of, sort_kinds
+from .wall import Bore
+
+Array = NDArray[np.float64]
+
+SETTLED, RESTLESS, JAMMED, PULLED = range(4)
+"""Outcomes: at rest; no convergence; no room left; pulled onto a magnet."""
+SOFT, HARD = 1e6, 1e8
+"""Stiffness of the walls at first and at last: it decides how fast the gaps close, not
+how far."""
+GAP, LOOSE = 3e-10, 1e-8
+"""Gaps closed to this count as closed, in lengths of the rod; and those of contacts so
+close that they share their force only slowly."""
+TOO_DEEP = 3e-4
+"""A state with a point deeper than this behind the wall is none."""
+STEPS, ROUNDS = 60, 40
+"""Newton's steps for one set of contacts; changes of the set."""
+PATIENCE, FROZEN = 6, 20
+"""Rounds after which contacts stay and none is dropped; and after which none is added:
+the set cannot cycle."""
+LONGEST = 0.4
+"""Most that a rotation may change in one step, in rad."""
+SMALL, CALM = 1e-11, 1e-7
+"""Newton's steps after which it is at rest, and below which the energy tells nothing.
+"""
+TRACE = 1e-9
+"""Part of bending that is always added."""
+
+
+@dataclass(slots=True)
+class Scene:
+    """A rod in a tube and a field; where the feet on the centre curve begin."""
+
+    rod: Rod
+    field: Array
+    tube: Bore
+    half: float
+    start: float
+
+
+@dataclass(slots=True)
+class Rest:
+    """How a rod came to rest.
+
+    Parameters
+    ----------
+    outcome : int
+        `SETTLED` and so on.
+    stable : bool
+        Whether it is a minimum.
+    turn, touches, seen : Turn, Touches, Seen
+        The state.
+    energy : float
+        Without walls.
+    overlap : float
+        How deep any place is behind the wall.
+    residual : float
+        Largest moment that is not balanced.
+    load : ndarray, shape (3,)
+        All loads beyond the clamp, but the root's pole.
+    """
+
+    outcome: int
+    stable: bool
+    turn: Turn
+    touches: Touches
+    seen: Seen
+    energy: float
+    overlap: float
+    residual: float
+    load: Array
+
+
+class _Look:
+    """The rod at one rotation: places, contacts, augmented energy."""
+
+    def __init__(self, scene: Scene, turn: Turn, touches: Touches, stiff: float):
+        self.X = np.empty((len(scene.rod.s), 3))
+        self.turn = turn
+        self.energy = own_energy(scene.rod, scene.field, turn, self.X)
+        self.seen = seen_of(scene.rod, turn, self.X, scene.tube, scene.half, touches)
+        self.force = np.maximum(0.0, touches.force - stiff * self.seen.gap)
+        walls = self.force @ self.force - touches.force @ touches.force
+        self.total = self.energy + 0.5 * walls / stiff
+
+
+def settle(scene: Scene, turn: Turn, touches: Touches, soft: float) -> Rest:
+    """Bring the rod to rest from a rotation and contacts (which it changes).
+
+    Parameters
+    ----------
+    soft : float
+        Stiffness of the walls to begin with.
+    """
+    stiff, failed, before, deepest = soft, 0, 1e9, 0.0
+    outcome = RESTLESS
+    look = _Look(scene, turn, touches, stiff)
+    exchange(scene.rod, turn, look.X, scene.tube, scene.half, touches, scene.start)
+    for k in range(ROUNDS):
+        seen = seen_of(scene.rod, turn, look.X, scene.tube, scene.half, touches)
+        sort_kinds(scene.rod, seen, touches, free=k < PATIENCE)
+        rested, stable, look = _newton(scene, turn, touches, stiff)
+        turn = look.turn
+        if not is_uniform_field(scene.field) and within_magnet(scene.field, look.X):
+            outcome = PULLED
+            break
+        worst = float(np.max(abs(look.force - touches.force), initial=0.0)) / stiff
+        touches.force = look.force
+        changed = 0
+        if worst < 1e-3:
+            changed = _strayed(touches, look.seen)
+            if k < PATIENCE:
+                kept = (touches.force > 0.0) | (look.seen.gap < GAP)
+                touches = touches.kept(kept)
+            added, deepest = exchange(
+                scene.rod, turn, look.X, scene.tube, scene.half, touches, scene.start
+            )
+            changed = changed + added if k < FROZEN else 0
+        if rested and not changed and worst < (GAP if k < FROZEN else LOOSE):
+            outcome = SETTLED if deepest < TOO_DEEP else JAMMED
+            break
+        failed += not rested
+        if k > 8 and worst > 1e-4:
+            outcome = JAMMED
+        if soft >= SOFT and (failed > 6 or (outcome == JAMMED and k > 14)):
+            break
+        if worst > 0.1 * before:
+            stiff = min(HARD, 10.0 * stiff)
+        before = worst
+    look = _Look(scene, turn, touches, HARD)
+    look.force = touches.force
+    gradient, load = _slopes(scene, look, touches, 0.0)[::3]
+    return Rest(
+        outcome, stable, turn, touches, look.seen, look.energy, deepest,
+        float(np.max(np.abs(gradient[3:]))), load,
+    )  # fmt: skip
+
+
+def is_uniform_field(field: Array) -> bool:
+    """Tell whether a field is the same everywhere."""
+    return bool(field[0] == UNIFORM)
+
+
+def _strayed(touches: Touches, seen: Seen) -> int:
+    """Return how many floating contacts are as far from home as they may be."""
+    far = abs(touches.s - touches.home) > 0.999 * touches.room
+    return int(np.sum(far & (touches.kind == FLOATS) & (touches.force > 0.0)))
+
+
+def _points(scene: Scene, look: _Look) -> tuple[Array, Array, Array]:
+    """Return node, pull and its derivative of each pole."""
+    rod = scene.rod
+    at = np.flatnonzero(rod.pole)
+    flux = np.zeros((len(at), 12))
+    for b, x in zip(flux, look.X[at], strict=True):
+        flux_at(scene.field, *x, b)
+    pole = rod.pole[at]
+    return at, pole[:, None] * flux[:, :3], pole[:, None, None] * flux[:, 3:].reshape(
+        -1, 3, 3
+    )
+
+
+def _slopes(
+    scene: Scene, look: _Look, touches: Touches, stiff: float
+) -> tuple[Array, Array, Array, Array]:
+    """Return gradient, Hessian (lower triangle), bending's diagonal, all loads."""
+    rod, seen = scene.rod, look.seen
+    n = len(rod.m)
+    size = STEP * n + 3
+    at, pull, steep = _points(scene, look)
+    in_use = np.flatnonzero(look.force > 0.0)
+    force, grad, hess = look.force[in_use], seen.grad[in_use], seen.hess[in_use]
+    push = force[:, None] * grad
+    beyond = np.zeros((n + 1, 3))
+    np.add.at(beyond, at, pull)
+    np.add.at(beyond, seen.element[in_use], push)
+    loads = np.cumsum(beyond[::-1], axis=0)[::-1][1:].copy()
+    g, H, K = np.empty(size), np.empty((size, size)), np.empty(size)
+    assemble(rod, look.turn, loads, g, H, K)
+    press(rod, look.turn, seen.element[in_use], seen.xi[in_use], push, g, H)
+    element = np.concatenate([seen.element[in_use], at - 1])
+    xi = np.concatenate([seen.xi[in_use], np.ones(len(at))])
+    if not len(in_use) and not np.any(steep):
+        return g, H, K, loads[0] + beyond[0] + rod.beyond[0]
+    A, B = np.empty((2, len(element), 3, size))
+    places(rod, look.turn, element, xi, A, B)
+    m = len(in_use)
+    weight = np.empty((len(element), 3, 3))
+    weight[:m] = stiff * grad[:, :, None] * grad[:, None, :] - (
+        force[:, None, None] * hess
+    )
+    weight[m:] = -steep
+    H += np.einsum("kim,kin->mn", A, np.einsum("kij,kjn->kin", weight, A), optimize=True)
+    slides = np.flatnonzero(touches.kind[in_use] == FLOATS)
+    if len(slides):
+        t, f = seen.t[in_use][slides], force[slides]
+        rows = np.einsum("ki,kij,kjn->kn", t, hess[slides], A[slides])
+        rows += np.einsum("ki,kin->kn", grad[slides], B[slides])
+        second = np.maximum(seen.second[in_use][slides], FLAT)
+        rows *= np.sqrt(f / second)[:, None]
+        H += rows.T @ rows
+    return g, H, K, loads[0] + beyond[0] + rod.beyond[0]
+
+
+def _factor(H: Array, K: Array) -> tuple[Array, float]:
+    """Return the Cholesky factor of H without the clamp, and how much was added."""
+    from scipy.linalg.lapack import dpotrf
+
+    shift = 0.0
+    for _ in range(60):
+        M = H[3:, 3:].copy()
+        M[np.diag_indices_from(M)] += (shift + TRACE) * K[3:]
+        factor, failed = dpotrf(M.T, lower=0, overwrite_a=1)
+        if not failed:
+            break
+        shift = 0.01 if shift == 0.0 else 4.0 * shift
+    return factor, shift
+
+
+def _solved(factor: Array, b: Array) -> Array:
+    from scipy.linalg.lapack import dpotrs
+
+    out = np.zeros(len(b))
+    out[3:] = dpotrs(factor, b[3:], lower=0)[0]
+    return out
+
+
+def _softest(factor: Array, size: int) -> Array:
+    """Return the softest way out of a saddle, of size 1e-3 rad."""
+    d = np.zeros(size)
+    d[3:] = np.sin(1.7 * np.arange(size - 3)) + 0.3
+    for _ in range(8):
+        d = _solved(factor, d)
+        d *= 1e-3 / np.max(np.abs(d))
+    return d
+
+
+def _newton(
+    scene: Scene, turn: Turn, touches: Touches, stiff: float
+) -> tuple[bool, bool, _Look]:
+    """Minimise the augmented energy; return whether it rests, is stable, and how."""
+    look = _Look(scene, turn, touches, stiff)
+    kicked = False
+    shift = 0.0
+    for step in range(STEPS):
+        g, H, K, _ = _slopes(scene, look, touches, stiff)
+        factor, shift = _factor(H, K)
+        d = _solved(factor, -g)
+        size = float(np.max(np.abs(d)))
+        if not math.isfinite(size):
+            return False, False, look
+        if size < SMALL:
+            if shift == 0.0 or (kicked and step > 40):
+                return True, shift == 0.0, look
+            d, kicked = _softest(factor, len(g)), True
+            look = _Look(scene, _by(look.turn, d), touches, stiff)
+            continue
+        found = _down(scene, look, touches, stiff, d, float(g @ d))
+        if found is None:
+            return size < CALM, shift == 0.0, look
+        look = found
+        if shift == 0.0 and size < CALM:
+            return True, True, look
+    return False, False, look
+
+
+def _by(turn: Turn, d: Array) -> Turn:
+    out = Turn(np.empty_like(turn.q), np.empty_like(turn.c))
+    turned(turn, d, out)
+    return out
+
+
+def _down(
+    scene: Scene, look: _Look, touches: Touches, stiff: float, d: Array, slope: float
+) -> _Look | None:
+    """Return the rod a step further down, or None where there is none."""
+    size = float(np.max(np.abs(d)))
+    share = min(1.0, LONGEST / size)
+    places_before = touches.s.copy(), touches.p.copy()
+    noise = 1e-13 * (1.0 + abs(look.total))
+    for _ in range(40):
+        new = _Look(scene, _by(look.turn, share * d), touches, stiff)
+        if size < CALM or new.total <= look.total + 1e-4 * share * slope + noise:
+            return new
+        touches.s, touches.p = (old.copy() for old in places_before)
+        share *= 0.5
+        if share < 1e-9:
+            break
+    return None
