@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..magnet.flux import UNIFORM, flux_at
+from .linear import FIRST, add_dyads, add_points, factor, solve
 from .rod import STEP, Rod, Turn, own_energy, turned, within_magnet
 from .slopes import assemble, places, press
 from .touch import FLAT, FLOATS, Seen, Touches, exchange, seen_of, sort_kinds
@@ -152,7 +153,7 @@ def settle(scene: Scene, turn: Turn, touches: Touches, soft: float) -> Rest:
     gradient, load = _slopes(scene, look, touches, 0.0)[::3]
     return Rest(
         outcome, stable, turn, touches, look.seen, look.energy, deepest,
-        float(np.max(np.abs(gradient[3:]))), load,
+        float(np.max(np.abs(gradient[FIRST:]))), load,
     )  # fmt: skip
 
 
@@ -210,47 +211,23 @@ def _slopes(
         force[:, None, None] * hess
     )
     weight[m:] = -steep
-    H += np.einsum("kim,kin->mn", A, np.einsum("kij,kjn->kin", weight, A), optimize=True)
+    width = STEP * (element + 1) + 3
+    add_points(H, A, weight, width)
     slides = np.flatnonzero(touches.kind[in_use] == FLOATS)
     if len(slides):
-        t, f = seen.t[in_use][slides], force[slides]
-        rows = np.einsum("ki,kij,kjn->kn", t, hess[slides], A[slides])
-        rows += np.einsum("ki,kin->kn", grad[slides], B[slides])
+        turns = np.einsum("ki,kij->kj", seen.t[in_use][slides], hess[slides])
+        rows = (turns[:, :, None] * A[slides]).sum(axis=1)
+        rows += (grad[slides, :, None] * B[slides]).sum(axis=1)
         second = np.maximum(seen.second[in_use][slides], FLAT)
-        rows *= np.sqrt(f / second)[:, None]
-        H += rows.T @ rows
+        add_dyads(H, rows, force[slides] / second, width[slides])
     return g, H, K, loads[0] + beyond[0] + rod.beyond[0]
 
 
-def _factor(H: Array, K: Array) -> tuple[Array, float]:
-    """Return the Cholesky factor of H without the clamp, and how much was added."""
-    from scipy.linalg.lapack import dpotrf
-
-    shift = 0.0
-    for _ in range(60):
-        M = H[3:, 3:].copy()
-        M[np.diag_indices_from(M)] += (shift + TRACE) * K[3:]
-        factor, failed = dpotrf(M.T, lower=0, overwrite_a=1)
-        if not failed:
-            break
-        shift = 0.01 if shift == 0.0 else 4.0 * shift
-    return factor, shift
-
-
-def _solved(factor: Array, b: Array) -> Array:
-    from scipy.linalg.lapack import dpotrs
-
-    out = np.zeros(len(b))
-    out[3:] = dpotrs(factor, b[3:], lower=0)[0]
-    return out
-
-
-def _softest(factor: Array, size: int) -> Array:
+def _softest(L: Array, size: int) -> Array:
     """Return the softest way out of a saddle, of size 1e-3 rad."""
-    d = np.zeros(size)
-    d[3:] = np.sin(1.7 * np.arange(size - 3)) + 0.3
+    d = np.sin(1.7 * np.arange(size)) + 0.3
     for _ in range(8):
-        d = _solved(factor, d)
+        solve(L, d)
         d *= 1e-3 / np.max(np.abs(d))
     return d
 
@@ -264,15 +241,15 @@ def _newton(
     shift = 0.0
     for step in range(STEPS):
         g, H, K, _ = _slopes(scene, look, touches, stiff)
-        factor, shift = _factor(H, K)
-        d = _solved(factor, -g)
+        shift = factor(H, K, TRACE, L := np.empty_like(H))
+        solve(L, d := -g)
         size = float(np.max(np.abs(d)))
         if not math.isfinite(size):
             return False, False, look
         if size < SMALL:
             if shift == 0.0 or (kicked and step > 40):
                 return True, shift == 0.0, look
-            d, kicked = _softest(factor, len(g)), True
+            d, kicked = _softest(L, len(g)), True
             look = _Look(scene, _by(look.turn, d), touches, stiff)
             continue
         found = _down(scene, look, touches, stiff, d, float(g @ d))

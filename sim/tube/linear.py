@@ -1,0 +1,100 @@
+"""Newton's matrix, factored and added to: without a library whose threads would wait.
+
+For the few hundred unknowns of a rod these loops are as quick as LAPACK on one thread.
+All matrices are symmetric, and filled below the diagonal alone.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.jit import njit
+from ..magnet.flux import PART
+
+Array = NDArray[np.float64]
+
+FIRST = 3
+"""The clamp does not turn: its unknowns come first, and are left out."""
+TRIES = 60
+
+
+@njit(**PART, fastmath={"contract", "reassoc"})
+def _factored(H, L):  # type: ignore[no-untyped-def]
+    """Factor all but the clamp; return whether it could."""
+    for i in range(FIRST, H.shape[0]):
+        for j in range(FIRST, i):
+            total = H[i, j]
+            for k in range(FIRST, j):
+                total -= L[i, k] * L[j, k]
+            L[i, j] = total / L[j, j]
+        total = H[i, i]
+        for k in range(FIRST, i):
+            total -= L[i, k] * L[i, k]
+        if not total > 0.0:
+            return False
+        L[i, i] = math.sqrt(total)
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def factor(H, K, trace, L):  # type: ignore[no-untyped-def]
+    """Factor H + (shift + trace) diag K; return the least shift tried that let it."""
+    shift = 0.0
+    for _ in range(TRIES):
+        added = shift + trace if shift == 0.0 else 0.75 * shift
+        for i in range(FIRST, H.shape[0]):
+            H[i, i] += added * K[i]
+        if _factored(H, L):
+            break
+        shift = 0.01 if shift == 0.0 else 4.0 * shift
+    return shift
+
+
+@njit(cache=True, error_model="numpy")
+def solve(L, b):  # type: ignore[no-untyped-def]
+    """Replace b by the solution of L L^T x = b, 0 at the clamp."""
+    b[:FIRST] = 0.0
+    n = b.shape[0]
+    for i in range(FIRST, n):
+        total = b[i]
+        for k in range(FIRST, i):
+            total -= L[i, k] * b[k]
+        b[i] = total / L[i, i]
+    for i in range(n - 1, FIRST - 1, -1):
+        b[i] /= L[i, i]
+        for k in range(FIRST, i):
+            b[k] -= L[i, k] * b[i]
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def add_points(H, A, weight, width):  # type: ignore[no-untyped-def]
+    """Add A^T W A of points whose places depend on the first `width` unknowns.
+
+    Parameters
+    ----------
+    H : ndarray, shape (n, n)
+        Changed.
+    A, weight, width : ndarray, shapes (k, 3, n), (k, 3, 3), (k,)
+        Of each point.
+    """
+    for k in range(A.shape[0]):
+        for a in range(width[k]):
+            for i in range(3):
+                f = 0.0
+                for j in range(3):
+                    f += weight[k, i, j] * A[k, j, a]
+                for c in range(a + 1):
+                    H[a, c] += f * A[k, i, c]
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+def add_dyads(H, rows, weight, width):  # type: ignore[no-untyped-def]
+    """Add the dyads of rows, shape (k, n), of `width` each, times weights."""
+    for k in range(rows.shape[0]):
+        for a in range(width[k]):
+            f = weight[k] * rows[k, a]
+            for c in range(a + 1):
+                H[a, c] += f * rows[k, c]
