@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,8 +13,8 @@ from .sim_case import field_of, rod_of
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
-    from ..sim import Field
     from ..sim.navigate import Lumen, Passage
+    from ..sim.tube import Tube
 
 EXAMPLE = (
     "Example: magbend sim navigate bend90.toml --gmc 2 --field-mT 20 --angle-deg 90 "
@@ -33,6 +34,9 @@ def navigate(
     angle_deg: Annotated[
         float, typer.Option(help="Direction of the uniform field from +x, in deg.")
     ] = 90.0,
+    elevation_deg: Annotated[
+        float, typer.Option(help="Angle of the uniform field above the xy plane.")
+    ] = 0.0,
     magnet: Annotated[
         Path | None, typer.Option(help="Magnet or source file (TOML).")
     ] = None,
@@ -51,7 +55,7 @@ def navigate(
     friction: Annotated[float, typer.Option(help="Coefficient of friction.")] = 0.0,
     gravity_m_s2: Annotated[
         tuple[float, float, float],
-        typer.Option(help="Free fall (x y z) in m/s2, within the plane."),
+        typer.Option(help="Free fall (x y z) in m/s2; z only in a tube."),
     ] = (0.0, 0.0, 0.0),
     push_limit_N: Annotated[
         float | None, typer.Option("--push-limit-N", help="Give up above this, in N.")
@@ -62,7 +66,9 @@ def navigate(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Push a rod through a planar lumen, with contact, friction and snaps.
+    """Push a rod through a lumen: planar, or a tube in space.
+
+    With contact, push force and snaps; friction in the plane.
 
     Without --field-mT, --magnet or --poses there is no field.
     """
@@ -71,7 +77,7 @@ def navigate(
     from ..sim import navigate as navigation
 
     rod = rod_of(gmc, specimen)
-    field = _field(field_mT, angle_deg, magnet, gap_mm, poses)
+    field = _field(field_mT, (angle_deg, elevation_deg), magnet, gap_mm, poses)
     place = navigation.read_lumen(lumen)
     if out is not None:
         output_folder(out)
@@ -97,18 +103,23 @@ def navigate(
 
 def _field(
     field_mT: float | None,
-    angle_deg: float,
+    angles_deg: tuple[float, float],
     file: Path | None,
     gap_mm: float | None,
     poses: Path | None,
 ) -> Any:
-    from ..sim import UniformField
+    from ..sim import Field, Uniform, UniformField
     from ..sim.navigate import moving, read_poses
 
     table = read_poses(poses) if poses is not None else []
+    angle_deg, elevation_deg = angles_deg
     field: Field = UniformField(flux_mT=0.0, angle_deg=angle_deg)
     if field_mT is not None or file is not None or gap_mm is not None:
         field = field_of(file, gap_mm, field_mT, angle_deg)
+    if elevation_deg and field_mT is not None:
+        field = Field(
+            Uniform(flux_mT=field_mT, angle_deg=angle_deg, elevation_deg=elevation_deg)
+        )
     if field.follows_gap and "gap_mm" not in (table or [{}])[0]:
         raise typer.BadParameter("--magnet needs --gap-mm D, or poses with gap_mm")
     return moving(field, table) if table else field
@@ -144,24 +155,30 @@ COLUMNS = (
     "tip_angle_deg", "overlap_mm",
 )  # fmt: skip
 
+IN_TUBE = ("along_mm", "residual_Nmm")
+"""What a step in a tube has besides."""
+
 
 def _row(step: Any) -> dict[str, Any]:
     row = {name: getattr(step, name) for name in COLUMNS}
-    row["tip_x_mm"], row["tip_y_mm"] = step.tip_mm
+    row |= {f"tip_{axis}_mm": at for axis, at in zip("xyz", step.tip_mm, strict=False)}
+    row |= {name: getattr(step, name) for name in IN_TUBE if hasattr(step, name)}
     row["contacts"] = [
-        {name: getattr(contact, name) for name in contact.__slots__}
+        {field.name: getattr(contact, field.name) for field in fields(contact)}
         for contact in step.contacts
     ]
     return row
 
 
-def write_passage(folder: Path, lumen: Lumen, passage: Passage, rod: Specimen) -> None:
+def write_passage(
+    folder: Path, lumen: Lumen | Tube, passage: Passage, rod: Specimen
+) -> None:
     """Write tables, figure and film of a passage into a folder."""
     import pandas as pd
 
     from ..core.files import write_text
     from ..core.json import write_json
-    from ..sim.navigate import draw_passage, film
+    from ..sim.navigate import SpatialStep, draw_passage, film
 
     rows = [_row(step) for step in passage.steps]
     contacts = [
@@ -172,9 +189,14 @@ def write_passage(folder: Path, lumen: Lumen, passage: Passage, rod: Specimen) -
     steps = pd.DataFrame(rows).to_csv(index=False)
     write_text(folder / "steps.csv", steps)
     heads = ["insertion_mm", "wall", "s_mm", "x_mm", "y_mm", "force_N", "friction_N"]
+    last = passage.steps[-1]
+    if isinstance(last, SpatialStep):
+        heads += ["z_mm", "along_mm"]
+        write_text(folder / "shape.csv", last.to_csv())
+    else:
+        last.centreline.to_csv(folder / "shape.csv")
     table = pd.DataFrame(contacts, columns=heads)
     write_text(folder / "contacts.csv", table.to_csv(index=False))
-    passage.steps[-1].centreline.to_csv(folder / "shape.csv")
     write_json(folder / "passage.json", _summary(passage))
     side_mm = max(rod.sides_mm)
     draw_passage(folder / "passage.png", lumen, passage, side_mm=side_mm)
@@ -186,8 +208,9 @@ def _print(data: dict[str, Any], passage: Passage) -> None:
     say(f"{data['specimen']} in {data['lumen']}: {data['outcome']}")
     say(f"  reached         {data['reached_mm']:.3f} mm")
     say(f"  gates           {', '.join(data['gates']) or 'none'}")
-    x, y = data["tip_mm"]
-    say(f"  tip             ({x:.4f}, {y:.4f}) mm, {data['tip_angle_deg']:.3f} deg")
+    tip = ", ".join(f"{at:.4f}" for at in data["tip_mm"])
+    from_curve = " from the curve" if len(data["tip_mm"]) == 3 else ""
+    say(f"  tip             ({tip}) mm, {data['tip_angle_deg']:.3f} deg{from_curve}")
     say(f"  greatest push   {1e3 * data['most_push_N']:.4g} mN")
     say(f"  root curvature  {data['most_root_curvature_per_mm']:.4g} 1/mm")
     say(f"  on the walls    {1e3 * data['most_wall_N']:.4g} mN")

@@ -22,6 +22,7 @@ from ...core.progress import Progress, silent
 from ...core.specimen import Specimen
 from ...sim import Field
 from ...sim.navigate import Lumen, Passage, navigate, navigate_many
+from ...sim.tube import Tube
 from ..library.space import sobol_points
 from .makeable import Candidates, Makeable, choices, dimension, rods, specimen_of
 
@@ -78,7 +79,7 @@ def tip_stiffness_N_mm(specimen: Specimen) -> float:
 
 
 def design_through(
-    lumen: Lumen,
+    lumen: Lumen | Tube,
     field: Field,
     makeable: Makeable,
     *,

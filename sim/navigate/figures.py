@@ -8,25 +8,30 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..study.figures import save
+from ..tube.tube import Tube
 from .curves import outline
 from .lumen import Lumen
 from .passage import Passage, Step
+from .views import draw_views, rod_in_views, tube_in_space
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 FRAMES = 80
 """Most frames of a film."""
 
 
-def draw_passage(path: Path, lumen: Lumen, passage: Passage, *, side_mm: float) -> None:
+def draw_passage(
+    path: Path, lumen: Lumen | Tube, passage: Passage, *, side_mm: float
+) -> None:
     """Draw shapes on the way, and push force, root curvature and wall force.
 
     Parameters
     ----------
     path : Path
         Where; its suffix (.svg, .pdf or .png) tells the format.
-    lumen, passage : Lumen, Passage
+    lumen, passage : Lumen or Tube, Passage
         What `navigate` was given, and returned.
     side_mm : float
         Of the rod, in mm.
@@ -35,12 +40,29 @@ def draw_passage(path: Path, lumen: Lumen, passage: Passage, *, side_mm: float) 
 
     figure = Figure(figsize=(9.6, 4.8), layout="constrained")
     grid = figure.add_gridspec(3, 2, width_ratios=(1.35, 1.0))
-    picture = figure.add_subplot(grid[:, 0])
-    _lumen(picture, lumen, passage)
     shown = passage.steps[:: max(1, len(passage.steps) // 6)]
-    for k, step in enumerate(shown):
-        picture.plot(*step.shape[:2], color="C0", alpha=0.25 + 0.4 * k / len(shown))
-    _rod(picture, passage.steps[-1], side_mm)
+    if isinstance(lumen, Tube):
+        left = grid[:, 0].subgridspec(2, 2, height_ratios=(1.5, 1.0))
+        solid = figure.add_subplot(left[0, :], projection="3d")
+        tube_in_space(solid, lumen, passage)
+        views = [figure.add_subplot(left[1, k]) for k in range(2)]
+        draw_views(views, lumen, passage)
+        rod_in_views(views, passage.steps[-1], side_mm)
+    else:
+        picture = figure.add_subplot(grid[:, 0])
+        _lumen(picture, lumen, passage)
+        for k, step in enumerate(shown):
+            picture.plot(*step.shape[:2], color="C0", alpha=0.25 + 0.4 * k / len(shown))
+        _rod(picture, passage.steps[-1], side_mm)
+    _curves(figure, grid, passage)
+    figure.suptitle(
+        f"{passage.specimen} in {lumen.name}: {passage.outcome}", fontsize=10
+    )
+    save(figure, path)
+
+
+def _curves(figure: Figure, grid: Any, passage: Passage) -> None:
+    """Draw push, root curvature and wall force over the insertion."""
     at = [step.insertion_mm for step in passage.steps]
     rows = (
         ("push_N", 1e3, "push in mN"),
@@ -59,13 +81,9 @@ def draw_passage(path: Path, lumen: Lumen, passage: Passage, *, side_mm: float) 
             axes.axvline(event.insertion_mm, color=colour, lw=0.8, ls="--")
         axes.tick_params(labelbottom=k == len(rows) - 1)
     axes.set_xlabel("insertion in mm\n(dashed: grey touch, green gate, red snap)")
-    figure.suptitle(
-        f"{passage.specimen} in {lumen.name}: {passage.outcome}", fontsize=10
-    )
-    save(figure, path)
 
 
-def film(path: Path, lumen: Lumen, passage: Passage, *, side_mm: float) -> None:
+def film(path: Path, lumen: Lumen | Tube, passage: Passage, *, side_mm: float) -> None:
     """Write the passage as an animated GIF, whole or not at all.
 
     Parameters
@@ -84,16 +102,25 @@ def film(path: Path, lumen: Lumen, passage: Passage, *, side_mm: float) -> None:
     from ...core.files import write_bytes
 
     steps = passage.steps[:: max(1, -(-len(passage.steps) // FRAMES))]
-    figure = Figure(figsize=(5.6, 4.2), dpi=80, layout="constrained")
+    size = (7.6, 4.0) if isinstance(lumen, Tube) else (5.6, 4.2)
+    figure = Figure(figsize=size, dpi=80, layout="constrained")
     canvas: Any = FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
-    _lumen(axes, lumen, passage)
-    title = axes.set_title(" ", fontsize=9)
+    if isinstance(lumen, Tube):
+        views = [figure.add_subplot(1, 2, k + 1) for k in range(2)]
+        draw_views(views, lumen, passage)
+    else:
+        axes = figure.add_subplot()
+        _lumen(axes, lumen, passage)
+    title = figure.suptitle(" ", fontsize=9)
     canvas.draw()
     figure.set_layout_engine("none")
     frames: list[Any] = []
     for step in (*steps, passage.steps[-1]):
-        drawn = _rod(axes, step, side_mm)
+        drawn = (
+            rod_in_views(views, step, side_mm)
+            if isinstance(lumen, Tube)
+            else _rod(axes, step, side_mm)
+        )
         title.set_text(
             f"{step.insertion_mm:.1f} mm in, push {1e3 * step.push_N:.2f} mN, "
             f"{len(step.contacts)} contacts"

@@ -12,9 +12,11 @@ from pydantic import PositiveFloat
 
 from ...core.errors import ConfigError, InputError
 from ...core.toml import FileModel, read_toml
+from ..tube.tube import Tube
 from .channels import channel
 from .curves import Arc, Point, circle, polyline, spline
-from .lumen import Gate, Lumen, Wall
+from .lumen import FEED, Gate, Lumen, Wall
+from .tube_file import TubeModel
 
 
 class _Leg(FileModel):
@@ -92,20 +94,23 @@ class LumenModel(FileModel):
     name: str
     mode: Literal["feed", "push"] = "feed"
     channel: _Channel | None = None
+    tube: TubeModel | None = None
     wall: list[_Wall] = Key(default_factory=list)
     inside_mm: Point | None = None
     entry: _Entry | None = None
     gate: list[_Gate] = Key(default_factory=list)
 
-    def lumen(self) -> Lumen:
+    def lumen(self) -> Lumen | Tube:
         """Return the lumen it describes."""
+        if self.tube is not None:
+            return self._tube(self.tube)
         gates = tuple(Gate(g.name, g.from_mm, g.to_mm) for g in self.gate)
         walls = tuple(Wall(wall.name, wall.arcs()) for wall in self.wall)
         entry = self.entry or _Entry()
         if self.channel is None:
             if not walls:
                 raise InputError(
-                    "a lumen must have a [channel] or at least one [[wall]]"
+                    "a lumen must have a [channel], a [tube] or at least one [[wall]]"
                 )
             return Lumen(
                 name=self.name,
@@ -138,6 +143,15 @@ class LumenModel(FileModel):
             gates=made.gates + gates,
         )
 
+    def _tube(self, tube: TubeModel) -> Tube:
+        planar = self.channel or self.wall or self.inside_mm or self.entry or self.gate
+        if planar or self.mode != FEED:
+            raise InputError(
+                "a [tube] must stand alone, and is fed: leave out mode, [channel], "
+                "[[wall]], inside_mm and [entry], and name its gates in [[tube.gate]]"
+            )
+        return tube.tube(self.name)
+
 
 def _between(walls: tuple[Wall, ...], entry_mm: Point) -> Point:
     """Return a point inside: between where the first two open walls begin."""
@@ -160,8 +174,8 @@ class _Poses(FileModel):
     pose: Annotated[list[_Pose], Key(min_length=1)]
 
 
-def read_lumen(path: Path) -> Lumen:
-    """Read a lumen file.
+def read_lumen(path: Path) -> Lumen | Tube:
+    """Read a lumen file: walls in the plane, or a tube in space.
 
     Raises
     ------

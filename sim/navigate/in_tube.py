@@ -179,6 +179,7 @@ class TubeWalk(Walk[TubeCase, TubeState]):
         return [g.name for g in self.case.lumen.gates if low < g.at_mm <= high]
 
     def error_mm(self) -> float:
+        """Return how far the last shape is from the one on elements half as long."""
         state = self._here()
         fine = replace(self.case, elements=2 * self.case.elements)
         outcome, new = at_rest(fine, state, state.insertion_mm, SOFT)

@@ -9,6 +9,7 @@ from ...core.errors import SolverError
 from ...core.progress import Progress, silent
 from ...core.specimen import Specimen
 from ..batch.threads import in_threads
+from ..tube.tube import Tube
 from .case import FieldOfWay
 from .lumen import Lumen
 from .passage import Passage
@@ -17,7 +18,7 @@ from .solver import navigate
 
 def navigate_many(
     specimens: Sequence[Specimen],
-    lumen: Lumen,
+    lumen: Lumen | Tube,
     field: FieldOfWay,
     *,
     progress: Progress = silent,

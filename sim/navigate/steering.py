@@ -20,6 +20,7 @@ from ...core.checks import positive
 from ...core.errors import InputError, SolverError
 from ...core.specimen import Specimen
 from ..fields import Field
+from ..tube.tube import Tube
 from .lumen import Gate, Lumen
 from .passage import INSERTED, Passage
 from .poses import KEYS, moving
@@ -73,7 +74,7 @@ class Steered:
 
 def steer(
     specimen: Specimen,
-    lumen: Lumen,
+    lumen: Lumen | Tube,
     field: Field | None,
     reach: dict[str, Reach],
     *,
@@ -121,6 +122,11 @@ def steer(
             f"reach and start must have the same of {', '.join(known)}; instead "
             f"received {keys} and {sorted(start)}"
         )
+    if isinstance(lumen, Tube):
+        raise InputError(
+            f"lumen must be planar to steer in; instead received tube {lumen.name!r}, "
+            "which has one way only: give `navigate` its poses"
+        )
     goal = _gate(lumen, gate)
     if field is None and "angle_deg" not in keys:
         start = start | {"angle_deg": angle_deg}
@@ -159,7 +165,7 @@ def steer(
 
 def _way(
     specimen: Specimen,
-    lumen: Lumen,
+    lumen: Lumen | Tube,
     field: Field | None,
     poses: Sequence[dict[str, float]],
     to_mm: float,
@@ -177,7 +183,7 @@ def _way(
     return way if way.outcome == INSERTED else None
 
 
-def _gate(lumen: Lumen, name: str) -> Gate:
+def _gate(lumen: Lumen | Tube, name: str) -> Gate:
     for gate in lumen.gates:
         if gate.name == name:
             return gate

@@ -176,8 +176,10 @@ def _points(scene: Scene, look: _Look) -> tuple[Array, Array, Array]:
     for b, x in zip(flux, look.X[at], strict=True):
         flux_at(scene.field, *x, b)
     pole = rod.pole[at]
-    return at, pole[:, None] * flux[:, :3], pole[:, None, None] * flux[:, 3:].reshape(
-        -1, 3, 3
+    return (
+        at,
+        pole[:, None] * flux[:, :3],
+        pole[:, None, None] * flux[:, 3:].reshape(-1, 3, 3),
     )
 
 

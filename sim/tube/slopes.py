@@ -257,7 +257,9 @@ def places(rod, turn, element, xi, A, B):  # type: ignore[no-untyped-def]
             if element[k] > e:
                 A[k, :, STEP * e : STEP * e + 12] += part
             elif element[k] == e:
-                _spread(turn, e, xi[k], h, Q, A[k, :, STEP * e : STEP * e + 12], d, v, t)
+                _spread(
+                    turn, e, xi[k], h, Q, A[k, :, STEP * e : STEP * e + 12], d, v, t
+                )
                 blend(turn, e, xi[k], d, v)
                 n = tangent(d, t)
                 f = shapes(xi[k])

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -34,9 +34,9 @@ class Ring:
 class Tube:
     """A tube around a curve in space.
 
-    The curve is the cubic spline through points, over their chord lengths; the radius
-    between them rises and falls with theirs and nowhere else. Before its first point
-    and after its last the tube goes on straight, as wide as it is there.
+    The curve is the natural cubic spline through points, over their chord lengths; the
+    radius between them rises and falls with theirs and nowhere else. Before its first
+    point and after its last the tube goes on straight, as wide as it is there.
 
     Parameters
     ----------
@@ -69,12 +69,14 @@ class Tube:
 
     def __post_init__(self) -> None:
         what = f"points_mm of tube {self.name!r}"
-        points = [vector(p, what, "mm", LONGEST_MM) for p in listed(self.points_mm) or ()]
+        points = [
+            vector(p, what, "mm", LONGEST_MM) for p in listed(self.points_mm) or ()
+        ]
         if len(points) < 2:
             raise InputError(
                 f"{what} must hold at least 2 points; instead received {len(points)}"
             )
-        for a, b in zip(points[:-1], points[1:], strict=True):
+        for a, b in itertools.pairwise(points):
             if math.dist(a, b) < 1e-6:
                 raise InputError(
                     f"{what} must not repeat a point in a row; instead {a} mm is there "
@@ -143,7 +145,11 @@ class Tube:
         z = np.asarray(p - self._bore.knots[k])[..., None]
         a, b, c, d = np.moveaxis(self._bore.spans[k, :3], -1, 0)
         return np.stack(
-            [a + z * (b + z * (c + z * d)), b + z * (2 * c + 3 * z * d), 2 * c + 6 * z * d]
+            [
+                a + z * (b + z * (c + z * d)),
+                b + z * (2 * c + 3 * z * d),
+                2 * c + 6 * z * d,
+            ]
         )
 
     def radius_at(self, along_mm: Array) -> Array:
@@ -212,14 +218,18 @@ def _bore_of(points: Array, radii: Array) -> Bore:
 
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     knots = np.concatenate([[0.0], np.cumsum(chords)])
-    given = CubicSpline(knots, points)
+    given = CubicSpline(knots, points, bc_type="natural")
     # Places along it, by Simpson's rule on 64 pieces of each chord.
-    fine = np.unique(np.concatenate([np.linspace(a, b, 65) for a, b in zip(knots[:-1], knots[1:], strict=True)]))
+    fine = np.unique(
+        np.concatenate([np.linspace(a, b, 65) for a, b in itertools.pairwise(knots)])
+    )
     mid = 0.5 * (fine[1:] + fine[:-1])
     speed, half = (np.linalg.norm(given(u, 1), axis=1) for u in (fine, mid))
     steps = np.diff(fine) * (speed[1:] + speed[:-1] + 4.0 * half) / 6.0
     along = np.concatenate([[0.0], np.cumsum(steps)])
-    count = int(min(MOST_KNOTS, max(64.0, 16.0 * len(chords), 8.0 * along[-1] / radii.min())))
+    count = int(
+        min(MOST_KNOTS, max(64.0, 16.0 * len(chords), 8.0 * along[-1] / radii.min()))
+    )
     equal = np.linspace(0.0, along[-1], count + 1)
     u = CubicSpline(along, fine)(equal)
     ends = given(knots[[0, -1]], 1)
@@ -277,8 +287,7 @@ def _check_apart(tube: Tube) -> None:
 def helix(
     radius_mm: float, pitch_mm: float, turns: float, points: int = 0
 ) -> tuple[Point, ...]:
-    """Return points along a helix that leaves the origin, its axis turned so that it
-    leaves along x.
+    """Return points along a helix that leaves the origin along x.
 
     Parameters
     ----------
