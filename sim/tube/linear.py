@@ -18,7 +18,10 @@ Array = NDArray[np.float64]
 
 FIRST = 3
 """The clamp does not turn: its unknowns come first, and are left out."""
-TRIES = 60
+TRIES = 40
+LEAST, GROWS = 1e-6, 5.0
+"""Shifts tried where the matrix is not positive: near to the least that it needs, so
+that what is soft stays soft."""
 
 
 @njit(**PART, fastmath={"contract", "reassoc"})
@@ -42,14 +45,15 @@ def _factored(H, L):  # type: ignore[no-untyped-def]
 @njit(cache=True, error_model="numpy")
 def factor(H, K, trace, L):  # type: ignore[no-untyped-def]
     """Factor H + (shift + trace) diag K; return the least shift tried that let it."""
-    shift = 0.0
+    shift = added = 0.0
     for _ in range(TRIES):
-        added = shift + trace if shift == 0.0 else 0.75 * shift
+        more = shift + trace - added
         for i in range(FIRST, H.shape[0]):
-            H[i, i] += added * K[i]
+            H[i, i] += more * K[i]
+        added += more
         if _factored(H, L):
             break
-        shift = 0.01 if shift == 0.0 else 4.0 * shift
+        shift = LEAST if shift == 0.0 else GROWS * shift
     return shift
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...core.jit import njit
 from ..spatial.march import AXIAL, C1, C3, K1, K3, WX, WZ, H
-from .rod import Rod, Turn, blend, element_at, own_energy, station
+from .rod import Rod, Turn, blend, element_at, fill_inner, own_energy, station
 
 Array = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ def product(p: Array, q: Array) -> Array:
 def straight(rod: Rod, start: Array) -> Turn:
     """Return a rod that goes straight on from its clamp."""
     n = len(rod.m)
-    return Turn(np.tile(start, (n + 1, 1)), np.zeros((n, 2, 4)))
+    return Turn(np.tile(start, (n + 1, 1)), np.zeros((n, 2, 3)), np.zeros((n, 2, 4)))
 
 
 def interpolated(old: Rod, turn: Turn, new: Rod, start: Array, ahead: float) -> Turn:
@@ -106,7 +106,14 @@ def interpolated(old: Rod, turn: Turn, new: Rod, start: Array, ahead: float) -> 
         off.append(scale[:, None] * part - line)
     # At a third xi^2 - xi is -2/9 and the cubic 2/27; at two thirds -2/9 and -2/27.
     even, odd = 0.5 * (off[0] + off[1]), 0.5 * (off[0] - off[1])
-    return Turn(q, np.stack([-4.5 * even, 13.5 * odd], axis=1))
+    inner = np.stack([-4.5 * even, 13.5 * odd], axis=1)
+    # As c = mean / 2 (0, v / 2), v is the vector of 4 conj(mean) c / mean.mean.
+    w, u = mean[:, None, :1], mean[:, None, 1:]
+    v = w * inner[..., 1:] - inner[..., :1] * u - np.cross(u, inner[..., 1:])
+    v *= 4.0 / (mean**2).sum(axis=1)[:, None, None]
+    turn = Turn(q, v, np.empty((len(v), 2, 4)))
+    fill_inner(turn)
+    return turn
 
 
 @njit(cache=True, error_model="numpy")

@@ -9,8 +9,9 @@ element, with xi from 0 to 1, the rotation is that of the quaternion
 whose length does not matter: turn and twist are w = 2 vec(conj(d) d') / d.d in the
 rod's own axes, the tangent is t = R(d) e3. Interpolating in the space around, and
 projecting, keeps the order of the polynomials and does not depend on the frame
-(Grohs, Hardering and Sander 2015). Nodes turn by q (1, v / 2), normalised; c0 and c1
-change by m (0, v / 2), with m the mean of the nodes: twelve unknowns an element.
+(Grohs, Hardering and Sander 2015). Nodes turn by q (1, v / 2), normalised; inside,
+c = (q0 + q1) / 2 (0, v / 2), so that a rod turned as a whole, or in itself, is the
+same to the last digit. That makes twelve unknowns an element.
 
 The energy is int sum_a C_a (w_a - k_a)^2 / 2 - m t . B(r) - W . t ds with W the weight
 beyond s. Because curl B = 0, the derivative of the magnetic part is that of poles at
@@ -73,9 +74,20 @@ class Rod(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """The rotation of a rod: quaternions of nodes (n + 1, 4), inner ones (n, 2, 4)."""
+    """The rotation of a rod.
+
+    Parameters
+    ----------
+    q : ndarray, shape (n + 1, 4)
+        Quaternions of the nodes.
+    v : ndarray, shape (n, 2, 3)
+        What bends the elements inside.
+    c : ndarray, shape (n, 2, 4)
+        Inner quaternions, by `fill_inner`.
+    """
 
     q: Array
+    v: Array
     c: Array
 
 
@@ -229,22 +241,23 @@ def _times(q, v, out):  # type: ignore[no-untyped-def]
     out[3] = 0.5 * (q[0] * v[2] + q[1] * v[1] - q[2] * v[0])
 
 
-@njit(**PART)
-def middle(turn, e, m):  # type: ignore[no-untyped-def]
-    """Fill the mean of an element's nodes, normalised."""
-    n = 0.0
-    for i in range(4):
-        m[i] = turn.q[e, i] + turn.q[e + 1, i]
-        n += m[i] * m[i]
-    for i in range(4):
-        m[i] /= math.sqrt(n)
+@njit(cache=True, error_model="numpy")
+def fill_inner(turn):  # type: ignore[no-untyped-def]
+    """Fill the inner quaternions."""
+    one, two = np.empty(4), np.empty(4)
+    for e in range(turn.v.shape[0]):
+        for a in range(2):
+            _times(turn.q[e], turn.v[e, a], one)
+            _times(turn.q[e + 1], turn.v[e, a], two)
+            for i in range(4):
+                turn.c[e, a, i] = 0.5 * (one[i] + two[i])
 
 
 @njit(cache=True, error_model="numpy")
 def turned(turn, by, out):  # type: ignore[no-untyped-def]
     """Fill `out` with `turn`, turned by the unknowns `by`, shape (9 n + 3,)."""
-    step, m = np.empty(4), np.empty(4)
-    n = turn.c.shape[0]
+    step = np.empty(4)
+    n = turn.v.shape[0]
     for k in range(n + 1):
         _times(turn.q[k], by[STEP * k : STEP * k + 3], step)
         size = 0.0
@@ -254,26 +267,61 @@ def turned(turn, by, out):  # type: ignore[no-untyped-def]
         for i in range(4):
             out.q[k, i] /= math.sqrt(size)
     for e in range(n):
-        middle(turn, e, m)
         for a in range(2):
-            at = STEP * e + 3 + 3 * a
-            _times(m, by[at : at + 3], step)
-            for i in range(4):
-                out.c[e, a, i] = turn.c[e, a, i] + step[i]
+            for k in range(3):
+                out.v[e, a, k] = turn.v[e, a, k] + by[STEP * e + 3 + 3 * a + k]
+    fill_inner(out)
 
 
 @njit(**PART)
-def bases(turn, e, Q, m):  # type: ignore[no-untyped-def]
-    """Fill what an element's unknowns change in its quaternions, shape (4, 4, 3)."""
-    middle(turn, e, m)
-    v, out = np.zeros(3), np.empty(4)
+def bases(turn, e, B):  # type: ignore[no-untyped-def]
+    """Fill what an element's unknowns change in its quaternions, shape (4, 4, 12)."""
+    v, one, two = np.zeros(3), np.empty(4), np.empty(4)
+    B[:] = 0.0
     for k in range(3):
         v[k] = 1.0
-        for a in range(4):
-            if a in (1, 2):
-                _times(m, v, out)
-            else:
-                _times(turn.q[e + (a == 3)], v, out)
+        for end in range(2):
+            _times(turn.q[e + end], v, one)
+            for a in range(2):
+                _times(one, turn.v[e, a], two)
+                for i in range(4):
+                    B[1 + a, i, 9 * end + k] = 0.5 * two[i]
             for i in range(4):
-                Q[a, i, k] = out[i]
+                B[3 * end, i, 9 * end + k] = one[i]
+                for a in range(2):
+                    B[1 + a, i, 3 + 3 * a + k] += 0.5 * one[i]
         v[k] = 0.0
+
+
+@njit(**PART)
+def second(turn, e, ga, H):  # type: ignore[no-untyped-def]
+    """Add what the unknowns' own curvature has, given the gradient (4, 4)."""
+    v, one, two = np.zeros(3), np.empty(4), np.empty(4)
+    for end in range(2):
+        q = turn.q[e + end]
+        # Normalisation: q turns by -q v.v / 8.
+        along = 0.0
+        for a in range(2):
+            _times(q, turn.v[e, a], two)
+            for i in range(4):
+                along += 0.5 * two[i] * ga[1 + a, i]
+        for i in range(4):
+            along += q[i] * ga[3 * end, i]
+        for k in range(3):
+            row = STEP * e + 9 * end + k
+            H[row, row] -= 0.25 * along
+        # A turn of the node changes what the inner unknowns do.
+        for k in range(3):
+            v[k] = 1.0
+            _times(q, v, one)
+            v[k] = 0.0
+            for m in range(3):
+                v[m] = 1.0
+                _times(one, v, two)
+                v[m] = 0.0
+                for a in range(2):
+                    row, column = STEP * e + 9 * end + k, STEP * e + 3 + 3 * a + m
+                    total = 0.0
+                    for i in range(4):
+                        total += 0.5 * two[i] * ga[1 + a, i]
+                    H[max(row, column), min(row, column)] += total

@@ -19,7 +19,7 @@ from ..magnet.flux import UNIFORM, flux_at
 from .linear import FIRST, add_dyads, add_points, factor, solve
 from .rod import STEP, Rod, Turn, own_energy, turned, within_magnet
 from .slopes import assemble, places, press
-from .touch import FLAT, FLOATS, Seen, Touches, exchange, seen_of, sort_kinds
+from .touch import FLAT, FLOATS, Seen, Touches, exchange, seen_of, sort_kinds, survey
 from .wall import Bore
 
 Array = NDArray[np.float64]
@@ -44,8 +44,14 @@ LONGEST = 0.4
 SMALL, CALM = 1e-11, 1e-7
 """Newton's steps after which it is at rest, and below which the energy tells nothing.
 """
-TRACE = 1e-9
-"""Part of bending that is always added."""
+WILD = 1e-3
+"""Steps beyond this are looked at: they must not pass a wall."""
+BOLD = 1e-4
+"""Steps beyond this are worth a second one back to the wall."""
+TRACE, EASE = 1e-9, 1e-3
+"""Part of bending that is always added; and most that is added while moments are out of
+balance, so that what costs nothing, as a turn about the axis of a straight tube, does
+not outrun the rest."""
 
 
 @dataclass(slots=True)
@@ -57,6 +63,11 @@ class Scene:
     tube: Bore
     half: float
     start: float
+
+    @property
+    def room(self) -> float:
+        """How far a rod on the centre curve is from the wall, where it is narrowest."""
+        return max(float(np.min(self.tube.spans[:, 3, 0])) - self.half, 1e-4)
 
 
 @dataclass(slots=True)
@@ -128,7 +139,7 @@ def settle(scene: Scene, turn: Turn, touches: Touches, soft: float) -> Rest:
         worst = float(np.max(abs(look.force - touches.force), initial=0.0)) / stiff
         touches.force = look.force
         changed = 0
-        if worst < 1e-3:
+        if worst < 1e-3 or not rested:
             changed = _strayed(touches, look.seen)
             if k < PATIENCE:
                 kept = (touches.force > 0.0) | (look.seen.gap < GAP)
@@ -164,8 +175,13 @@ def is_uniform_field(field: Array) -> bool:
 
 def _strayed(touches: Touches, seen: Seen) -> int:
     """Return how many floating contacts are as far from home as they may be."""
-    far = abs(touches.s - touches.home) > 0.999 * touches.room
-    return int(np.sum(far & (touches.kind == FLOATS) & (touches.force > 0.0)))
+    floats = (touches.kind == FLOATS) & (touches.force > 0.0)
+    return int(np.sum(floats & _held(touches)))
+
+
+def _held(touches: Touches) -> Array:
+    """Tell which contacts are as far from home as they may be."""
+    return np.asarray(abs(touches.s - touches.home) > 0.999 * touches.room)
 
 
 def _points(scene: Scene, look: _Look) -> tuple[Array, Array, Array]:
@@ -215,7 +231,7 @@ def _slopes(
     weight[m:] = -steep
     width = STEP * (element + 1) + 3
     add_points(H, A, weight, width)
-    slides = np.flatnonzero(touches.kind[in_use] == FLOATS)
+    slides = np.flatnonzero((touches.kind == FLOATS)[in_use] & ~_held(touches)[in_use])
     if len(slides):
         turns = np.einsum("ki,kij->kj", seen.t[in_use][slides], hess[slides])
         rows = (turns[:, :, None] * A[slides]).sum(axis=1)
@@ -241,48 +257,78 @@ def _newton(
     look = _Look(scene, turn, touches, stiff)
     kicked = False
     shift = 0.0
-    for step in range(STEPS):
+    for _ in range(STEPS):
         g, H, K, _ = _slopes(scene, look, touches, stiff)
-        shift = factor(H, K, TRACE, L := np.empty_like(H))
+        uneven = float(np.max(np.abs(g[FIRST:])))
+        trace = TRACE + min(EASE, 0.05 * uneven)
+        shift = factor(H, K, trace, L := np.empty_like(H))
         solve(L, d := -g)
         size = float(np.max(np.abs(d)))
         if not math.isfinite(size):
             return False, False, look
-        if size < SMALL:
-            if shift == 0.0 or (kicked and step > 40):
-                return True, shift == 0.0, look
+        if size < SMALL and (shift == 0.0 or kicked):
+            return True, shift == 0.0, look
+        if size < CALM and shift > 0.0 and not kicked:
             d, kicked = _softest(L, len(g)), True
             look = _Look(scene, _by(look.turn, d), touches, stiff)
             continue
-        found = _down(scene, look, touches, stiff, d, float(g @ d))
+        found = _down(scene, look, touches, stiff, d, g, L)
         if found is None:
             return size < CALM, shift == 0.0, look
         look = found
         if shift == 0.0 and size < CALM:
             return True, True, look
+        if size > WILD and _behind(scene, look) > 0.1 * scene.room:
+            break  # there are walls that it does not know of
     return False, False, look
 
 
+def _strays(scene: Scene, old: _Look, new: _Look) -> bool:
+    """Tell whether a step is so long that it could pass a wall unseen."""
+    return float(np.max(np.abs(new.X - old.X))) > scene.room
+
+
+def _behind(scene: Scene, look: _Look) -> float:
+    """Return how deep the rod is behind the wall, contacts or not."""
+    seen = survey(
+        scene.rod, look.turn, look.X, scene.tube, scene.half, scene.start
+    )  # fmt: skip
+    return -float(np.min(seen[1]))
+
+
 def _by(turn: Turn, d: Array) -> Turn:
-    out = Turn(np.empty_like(turn.q), np.empty_like(turn.c))
+    out = Turn(*(np.empty_like(part) for part in turn))
     turned(turn, d, out)
     return out
 
 
 def _down(
-    scene: Scene, look: _Look, touches: Touches, stiff: float, d: Array, slope: float
-) -> _Look | None:
-    """Return the rod a step further down, or None where there is none."""
+    scene: Scene, look: _Look, touches: Touches, stiff: float, d: Array, g: Array,
+    L: Array,
+) -> _Look | None:  # fmt: skip
+    """Return the rod a step further down, or None where there is none.
+
+    A straight step along a round wall goes into it: if that costs more than the step
+    gains, a second one with the same factor brings the rod back to the wall.
+    """
     size = float(np.max(np.abs(d)))
     share = min(1.0, LONGEST / size)
-    places_before = touches.s.copy(), touches.p.copy()
+    slope = float(g @ d)
+    before = touches.s.copy(), touches.p.copy()
     noise = 1e-13 * (1.0 + abs(look.total))
-    for _ in range(40):
+    for _ in range(30):
+        enough = look.total + 1e-4 * share * slope + noise
         new = _Look(scene, _by(look.turn, share * d), touches, stiff)
-        if size < CALM or new.total <= look.total + 1e-4 * share * slope + noise:
+        if size < CALM:
             return new
-        touches.s, touches.p = (old.copy() for old in places_before)
+        wild = share * size > WILD and _strays(scene, look, new)
+        if new.total <= enough and not wild:
+            return new
+        if share * size > BOLD and not wild:
+            solve(L, back := (1.0 - share) * g - _slopes(scene, new, touches, stiff)[0])
+            new = _Look(scene, _by(new.turn, back), touches, stiff)
+            if new.total <= enough and not _strays(scene, look, new):
+                return new
+        touches.s, touches.p = (old.copy() for old in before)
         share *= 0.5
-        if share < 1e-9:
-            break
     return None

@@ -3,7 +3,7 @@
 By the quaternion d and its derivative v the strain is w_a = 2 d . J_a v / (h d . d),
 the tangent's part along p is d . T d / d . d with T symmetric: quotients of quadratic
 forms, whose derivatives are written out here and carried to the unknowns by the bases
-of `rod.bases`. The node's normalisation adds -q . grad / 4 to its diagonal.
+of `rod.bases`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,18 @@ import numpy as np
 
 from ...core.jit import njit
 from ..magnet.flux import PART
-from .rod import GAUSS, POINTS, STEP, WEIGHTS, bases, blend, shapes, strain, tangent
+from .rod import (
+    GAUSS,
+    POINTS,
+    STEP,
+    WEIGHTS,
+    bases,
+    blend,
+    second,
+    shapes,
+    strain,
+    tangent,
+)  # fmt: skip
 
 
 @njit(**PART)
@@ -116,27 +127,30 @@ def _bending(rod, e, d, v, n, w, J, gd, gv, dd, dv, vv, soft):  # type: ignore[n
 
 
 @njit(**PART)
-def _carry(turn, e, Q, ga, hb, g, H):  # type: ignore[no-untyped-def]
-    """Add gradient (4, 4) and Hessian (4, 4, 4, 4) by an element's quaternions."""
+def _carry(turn, e, B, ga, hb, W, g, H):  # type: ignore[no-untyped-def]
+    """Add gradient (4, 4) and Hessian (4, 4, 4, 4) by an element's quaternions.
+
+    Of the Hessian the blocks a >= b are given. `W`, shape (4, 4, 12), is work space.
+    """
     for a in range(4):
-        for k in range(3):
-            row = STEP * e + 3 * a + k
-            for i in range(4):
-                g[row] += Q[a, i, k] * ga[a, i]
-            for b in range(a + 1):
-                for m in range(3):
-                    total = 0.0
-                    for i in range(4):
-                        for j in range(4):
-                            total += Q[a, i, k] * hb[a, b, i, j] * Q[b, j, m]
-                    H[row, STEP * e + 3 * b + m] += total
-        if a in (0, 3):
-            along = 0.0
-            for i in range(4):
-                along += turn.q[e + (a == 3), i] * ga[a, i]
-            for k in range(3):
-                row = STEP * e + 3 * a + k
-                H[row, row] -= 0.25 * along
+        for i in range(4):
+            for u in range(12):
+                W[a, i, u] = 0.0
+            for b in range(4):
+                for j in range(4):
+                    f = hb[a, b, i, j] if a >= b else hb[b, a, j, i]
+                    for u in range(12):
+                        W[a, i, u] += f * B[b, j, u]
+    at = STEP * e
+    for a in range(4):
+        for i in range(4):
+            for u in range(12):
+                f = B[a, i, u]
+                g[at + u] += f * ga[a, i]
+                if f != 0.0:
+                    for w in range(u + 1):
+                        H[at + u, at + w] += f * W[a, i, w]
+    second(turn, e, ga, H)
 
 
 @njit(cache=True, error_model="numpy")
@@ -156,14 +170,15 @@ def assemble(rod, turn, loads, g, H, K):  # type: ignore[no-untyped-def]
     H[:, :] = 0.0
     K[:] = 0.0
     d, v, w, t = np.empty(4), np.empty(4), np.empty(3), np.empty(3)
-    J, Q, m, p = np.empty((3, 4)), np.empty((4, 4, 3)), np.empty(4), np.empty(3)
+    J, B, W = np.empty((3, 4)), np.empty((4, 4, 12)), np.empty((4, 4, 12))
+    p, dv_u = np.empty(3), np.empty(4)
     gd, gv, gp = np.empty(4), np.empty(4), np.empty(4)
     dd, dv, vv = np.empty((4, 4)), np.empty((4, 4)), np.empty((4, 4))
     T, hp, soft = np.empty((4, 4)), np.empty((4, 4)), np.empty((2, 4, 4))
     ga, hb = np.empty((4, 4)), np.empty((4, 4, 4, 4))
     for e in range(rod.m.shape[0]):
         h = rod.s[e + 1] - rod.s[e]
-        bases(turn, e, Q, m)
+        bases(turn, e, B)
         ga[:] = 0.0
         hb[:] = 0.0
         for q in range(GAUSS):
@@ -195,17 +210,21 @@ def assemble(rod, turn, loads, g, H, K):  # type: ignore[no-untyped-def]
                                 + fv[a] * f[b] * dv[j, i]
                                 + fv[a] * fv[b] * vv[i, j]
                             )
-                for k in range(3):
-                    total = 0.0
-                    for i in range(4):
-                        for j in range(4):
-                            total += Q[a, i, k] * soft[1, i, j] * Q[a, j, k]
-                    K[STEP * e + 3 * a + k] += weight * fv[a] * fv[a] * total
-        _carry(turn, e, Q, ga, hb, g, H)
+            for u in range(12):
+                total = 0.0
+                for i in range(4):
+                    dv_u[i] = 0.0
+                    for a in range(4):
+                        dv_u[i] += fv[a] * B[a, i, u]
+                for i in range(4):
+                    for j in range(4):
+                        total += dv_u[i] * soft[1, i, j] * dv_u[j]
+                K[STEP * e + u] += weight * total
+        _carry(turn, e, B, ga, hb, W, g, H)
 
 
 @njit(**PART)
-def _spread(turn, e, xi, h, Q, A, d, v, t):  # type: ignore[no-untyped-def]
+def _spread(turn, e, xi, h, B, A, d, v, t):  # type: ignore[no-untyped-def]
     """Add to A, shape (3, 12), the derivatives of the place at xi of an element."""
     T, grad, hess = np.empty((4, 4)), np.empty(4), np.empty((4, 4))
     p = np.zeros(3)
@@ -219,15 +238,14 @@ def _spread(turn, e, xi, h, Q, A, d, v, t):  # type: ignore[no-untyped-def]
             pull_slopes(p, d, n, T, grad, hess)
             p[i] = 0.0
             for a in range(4):
-                for k in range(3):
-                    for j in range(4):
-                        A[i, 3 * a + k] += (
-                            h * xi * WEIGHTS[q] * f[a] * grad[j] * Q[a, j, k]
-                        )
+                for j in range(4):
+                    weight = h * xi * WEIGHTS[q] * f[a] * grad[j]
+                    for u in range(12):
+                        A[i, u] += weight * B[a, j, u]
 
 
 @njit(cache=True, error_model="numpy")
-def places(rod, turn, element, xi, A, B):  # type: ignore[no-untyped-def]
+def places(rod, turn, element, xi, A, T):  # type: ignore[no-untyped-def]
     """Fill the derivatives of places and tangents of points of the rod.
 
     Parameters
@@ -236,43 +254,40 @@ def places(rod, turn, element, xi, A, B):  # type: ignore[no-untyped-def]
         What bends.
     element, xi : ndarray, shape (k,)
         Where the points are.
-    A, B : ndarray, shape (k, 3, 9 n + 3)
+    A, T : ndarray, shape (k, 3, 9 n + 3)
         Filled: of the places, and of the tangents.
     """
     A[:] = 0.0
-    B[:] = 0.0
-    d, v, t, m = np.empty(4), np.empty(4), np.empty(3), np.empty(4)
-    Q, part = np.empty((4, 4, 3)), np.empty((3, 12))
-    T, grad, hess = np.empty((4, 4)), np.empty(4), np.empty((4, 4))
+    T[:] = 0.0
+    d, v, t = np.empty(4), np.empty(4), np.empty(3)
+    B, part = np.empty((4, 4, 12)), np.empty((3, 12))
+    form, grad, hess = np.empty((4, 4)), np.empty(4), np.empty((4, 4))
     p = np.zeros(3)
     last = -1
     for k in range(element.shape[0]):
         last = max(last, element[k])
     for e in range(last + 1):
         h = rod.s[e + 1] - rod.s[e]
-        bases(turn, e, Q, m)
+        bases(turn, e, B)
         part[:] = 0.0
-        _spread(turn, e, 1.0, h, Q, part, d, v, t)
+        _spread(turn, e, 1.0, h, B, part, d, v, t)
+        at = STEP * e
         for k in range(element.shape[0]):
             if element[k] > e:
-                A[k, :, STEP * e : STEP * e + 12] += part
+                A[k, :, at : at + 12] += part
             elif element[k] == e:
-                _spread(
-                    turn, e, xi[k], h, Q, A[k, :, STEP * e : STEP * e + 12], d, v, t
-                )
+                _spread(turn, e, xi[k], h, B, A[k, :, at : at + 12], d, v, t)
                 blend(turn, e, xi[k], d, v)
                 n = tangent(d, t)
                 f = shapes(xi[k])
                 for i in range(3):
                     p[i] = 1.0
-                    pull_slopes(p, d, n, T, grad, hess)
+                    pull_slopes(p, d, n, form, grad, hess)
                     p[i] = 0.0
                     for a in range(4):
-                        for c in range(3):
-                            for j in range(4):
-                                B[k, i, STEP * e + 3 * a + c] += (
-                                    f[a] * grad[j] * Q[a, j, c]
-                                )
+                        for j in range(4):
+                            for u in range(12):
+                                T[k, i, at + u] += f[a] * grad[j] * B[a, j, u]
 
 
 @njit(cache=True, error_model="numpy")
@@ -288,15 +303,14 @@ def press(rod, turn, element, xi, force, g, H):  # type: ignore[no-untyped-def]
     g, H : ndarray
         As of `assemble`; loads beyond an element are in its `loads`.
     """
-    d, v, t, m = np.empty(4), np.empty(4), np.empty(3), np.empty(4)
-    Q, T, grad, hess = (
-        np.empty((4, 4, 3)), np.empty((4, 4)), np.empty(4), np.empty((4, 4)),
-    )  # fmt: skip
+    d, v, t = np.empty(4), np.empty(4), np.empty(3)
+    B, W = np.empty((4, 4, 12)), np.empty((4, 4, 12))
+    T, grad, hess = np.empty((4, 4)), np.empty(4), np.empty((4, 4))
     ga, hb = np.empty((4, 4)), np.empty((4, 4, 4, 4))
     for k in range(element.shape[0]):
         e = element[k]
         h = rod.s[e + 1] - rod.s[e]
-        bases(turn, e, Q, m)
+        bases(turn, e, B)
         ga[:] = 0.0
         hb[:] = 0.0
         for q in range(GAUSS):
@@ -312,4 +326,4 @@ def press(rod, turn, element, xi, force, g, H):  # type: ignore[no-untyped-def]
                     for b in range(a + 1):
                         for j in range(4):
                             hb[a, b, i, j] -= weight * f[a] * f[b] * hess[i, j]
-        _carry(turn, e, Q, ga, hb, g, H)
+        _carry(turn, e, B, ga, hb, W, g, H)

@@ -48,7 +48,8 @@ class Tube:
         Inner radius, everywhere or at each point, in mm.
     entry_mm, direction : tuple of float, optional
         Where the guide ends, out of which the rod slides, and where to: the first point
-        and along the curve, if not given.
+        and along the curve, if not given. Without an entry a direction is the curve's
+        too.
     gates : sequence of Ring
         Places along the tube; one named ``end`` at its last point is always there.
 
@@ -83,10 +84,16 @@ class Tube:
                     "twice"
                 )
         store(self, points_mm=tuple(points), radius_mm=self._radii(len(points)))
-        store(self, _bore=_bore_of(np.array(points), np.array(self.radius_mm)))
+        store(self, direction=self._towards())
+        first = self.direction if self.entry_mm is None else None
+        store(self, _bore=_bore_of(np.array(points), np.array(self.radius_mm), first))
         _check_turns(self)
         _check_apart(self)
-        self._check_entry()
+        start, along, _ = self.at(0.0)
+        entry = tuple(start) if self.entry_mm is None else self.entry_mm
+        towards = self.direction or tuple(along / np.linalg.norm(along))
+        entry = vector(entry, "entry_mm", "mm", LONGEST_MM)
+        store(self, entry_mm=entry, direction=vector(towards, "direction"))
         gates = tuple(g for g in self.gates if g.name != "end")
         store(self, gates=(*gates, Ring("end", self.length_mm)))
 
@@ -103,20 +110,18 @@ class Tube:
             )
         return tuple(size(value, what, "mm") for value in given)
 
-    def _check_entry(self) -> None:
-        start = self.at(0.0)
-        entry = self.entry_mm or tuple(start[0])
-        towards = self.direction or tuple(start[1])
-        entry = vector(entry, "entry_mm", "mm", LONGEST_MM)
-        towards = vector(towards, "direction", "")
-        length = math.hypot(*towards)
+    def _towards(self) -> Point | None:
+        """Return the given direction with length 1, if one is given."""
+        if self.direction is None:
+            return None
+        x, y, z = vector(self.direction, "direction")
+        length = math.hypot(x, y, z)
         if length < 1e-9:
             raise InputError(
                 f"direction of tube {self.name!r} must not be (0, 0, 0): give the "
                 "direction in which the rod enters"
             )
-        x, y, z = (part / length for part in towards)
-        store(self, entry_mm=entry, direction=(x, y, z))
+        return x / length, y / length, z / length
 
     @property
     def length_mm(self) -> float:
@@ -212,13 +217,15 @@ class Tube:
             )
 
 
-def _bore_of(points: Array, radii: Array) -> Bore:
+def _bore_of(points: Array, radii: Array, direction: Point | None) -> Bore:
     """Return splines over arc length, in equal spans."""
     from scipy.interpolate import CubicSpline, PchipInterpolator
 
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     knots = np.concatenate([[0.0], np.cumsum(chords)])
-    given = CubicSpline(knots, points, bc_type="natural")
+    level = np.zeros(3)
+    first = (2, level) if direction is None else (1, np.array(direction))
+    given = CubicSpline(knots, points, bc_type=(first, (2, level)))
     # Places along it, by Simpson's rule on 64 pieces of each chord.
     fine = np.unique(
         np.concatenate([np.linspace(a, b, 65) for a, b in itertools.pairwise(knots)])

@@ -160,7 +160,7 @@ def test_the_examples_are_read():
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('name = "a"\n', r"must have a \[channel\] or at least one \[\[wall\]\]"),
+        ('name = "a"\n', r"a \[channel\], a \[tube\] or at least one \[\[wall"),
         ('name = "a"\n[channel]\nwidth = 3.0\n', "line 3: unknown key 'channel.width'"),
         (
             'name = "a"\n[channel]\nwidth_mm = 3.0\n[[channel.leg]]\nturn_deg = 9.0\n',

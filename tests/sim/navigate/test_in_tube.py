@@ -1,0 +1,205 @@
+"""A rod in a tube against what is known: free rods, the plane, columns, helices."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from magbend.core.magnet import Magnet
+from magbend.core.specimen import Section, Specimen
+from magbend.sim import (
+    Field,
+    MagnetField,
+    Support,
+    Uniform,
+    UniformField,
+    gmc,
+    solve_spatial,
+)
+from magbend.sim.navigate import channel, navigate
+from magbend.sim.tube import Tube, helix
+
+NOTHING = UniformField(flux_mT=0.0)
+WIDE = Tube(name="wide", points_mm=[(0, 0, 0), (80, 0, 0)], radius_mm=60.0)
+OBLIQUE = Field(Uniform(flux_mT=50.0, angle_deg=70.0, elevation_deg=40.0))
+MAGNET = MagnetField(
+    magnet=Magnet(
+        sides_mm=(55.0, 55.0, 55.0), remanence_T=1.3, elevation_deg=30.0,
+        offset_mm=(3.0, 0.0, 5.0),
+    ),
+    gap_mm=45.0,
+)  # fmt: skip
+DOWN = Support(gravity_m_s2=(1.0, 2.0, -9.80665))
+
+
+def round_rod(length_mm: float, E_MPa: float = 1.0, **given) -> Specimen:
+    given = {"remanence_mT": 0.0, "diameter_mm": 1.0} | given
+    sections = (Section(length_mm=length_mm, E_MPa=E_MPa),)
+    return Specimen(name="round", shape="round", sections=sections, **given)
+
+
+def stiffness(rod: Specimen) -> float:
+    """Return EI in N mm2."""
+    return rod.sections[0].E_MPa * rod.cross_sections[0].in_plane_mm4
+
+
+CURVED = Specimen(
+    name="curved ribbon", shape="rectangle", width_mm=0.8, height_mm=0.6,
+    remanence_mT=25.0, natural_curvature_per_mm=0.03, density_kg_m3=2600.0,
+    sections=(Section(length_mm=15.0, E_MPa=2.0), Section(length_mm=15.0, E_MPa=1.0)),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("rod", "field", "support"),
+    [
+        (gmc(2), OBLIQUE, Support()),
+        (gmc(2), MAGNET, Support()),
+        (CURVED, OBLIQUE, DOWN),
+    ],
+    ids=["oblique field", "magnet above the plane", "curved, heavy, twisted ribbon"],
+)
+def test_a_rod_that_touches_nothing_is_solve_spatials(rod, field, support):
+    passage = navigate(rod, WIDE, field, support=support, step_mm=10.0, refine=False)
+    last = passage.steps[-1]
+    free = solve_spatial(rod, field, support=support, points=len(last.s_mm))
+    far = np.interp(free.s_mm, last.s_mm, np.arange(len(last.s_mm)))
+    same = np.isclose(far, np.rint(far), atol=1e-9)
+    off = last.shape[:3].T[np.rint(far[same]).astype(int)] - free.r_mm[same]
+    assert same.sum() > 20
+    assert np.abs(off).max() < 1e-6
+    assert last.contacts == ()
+    assert last.residual_Nmm < 1e-10
+
+
+def test_the_error_falls_with_the_fifth_power_of_the_element():
+    free = solve_spatial(CURVED, OBLIQUE, support=DOWN).r_mm[-1]
+    off = []
+    for elements in (8, 16):
+        last = navigate(
+            CURVED, WIDE, OBLIQUE, support=DOWN, step_mm=15.0, elements=elements,
+            refine=False,
+        ).steps[-1]  # fmt: skip
+        off.append(np.linalg.norm(last.tip_mm - free))
+    assert math.log2(off[0] / off[1]) > 4.5
+
+
+def test_a_bend_in_the_plane_is_the_planar_solvers():
+    """The middle line is given as points: a spline is not quite arcs and segments."""
+    rod, radius = round_rod(28.0, 5.0, remanence_mT=20.0), 12.0
+    legs = [(6.0, 0.0), (radius * math.pi / 3.0, 60.0), (20.0, 0.0)]
+    bend = channel("bend", width_mm=3.0, legs=legs)
+    turn = np.radians(np.arange(1.5, 60.0, 1.5))
+    arc = np.column_stack([6.0 + radius * np.sin(turn), radius * (1.0 - np.cos(turn))])
+    c, s = 0.5, math.sqrt(0.75)
+    leave = np.array([6.0 + radius * s, radius * (1.0 - c)])
+    straight = np.arange(0.0, 20.1, 0.31)[:, None] * [c, s] + leave
+    points = np.vstack([[[x, 0.0] for x in np.arange(0.0, 6.1, 0.31)], arc, straight])
+    tube = Tube(
+        name="bend", points_mm=np.column_stack([points, 0.0 * points[:, 0]]),
+        radius_mm=1.5,
+    )  # fmt: skip
+    field = UniformField(flux_mT=15.0, angle_deg=-40.0)
+    planar, space = (
+        navigate(rod, lumen, field, step_mm=2.0, refine=False) for lumen in (bend, tube)
+    )
+    pairs = [*zip(planar.steps, space.steps, strict=True)]
+    most = planar.most("wall_N")
+    assert max(len(a.contacts) for a, _ in pairs) >= 2
+    for a, b in pairs:
+        assert b.push_N == pytest.approx(a.push_N, abs=2e-3 * most)
+        assert b.wall_N == pytest.approx(a.wall_N, abs=2e-3 * most)
+        assert np.hypot(*(np.array(a.tip_mm) - b.tip_mm[:2])) < 5e-3
+        assert abs(b.tip_mm[2]) < 1e-9
+
+
+def chain(rod, length_mm, links, flux_T, wall):
+    """Return the tip of least energy of a chain of rigid links, and that energy.
+
+    Another discretisation (tangents of links, springs between: no twist), another
+    algorithm (sequential quadratic programs), another wall (nearest of many points).
+    """
+    h = length_mm / links
+    m = rod.cross_sections[0].area_mm2 * rod.remanence_mT * 1e-9 / (4e-7 * math.pi)
+    springs = np.full(links, stiffness(rod) / h)
+    springs[0] *= 2.0  # half a link from the clamp
+
+    def tangents(angles):
+        a, b = angles.reshape(2, -1)
+        t = np.column_stack([np.cos(a) * np.cos(b), np.sin(a) * np.cos(b), np.sin(b)])
+        ta = np.column_stack([-t[:, 1], t[:, 0], 0.0 * a])
+        tb = np.column_stack(
+            [-np.cos(a) * np.sin(b), -np.sin(a) * np.sin(b), np.cos(b)]
+        )
+        return t, ta, tb
+
+    def energy(angles):
+        t, ta, tb = tangents(angles)
+        along = np.vstack([[1.0, 0.0, 0.0], t])
+        cosine = np.clip((along[1:] * along[:-1]).sum(axis=1), -1.0, 1.0)
+        bent = np.arccos(cosine)
+        value = 0.5 * springs @ bent**2 - m * h * (t @ flux_T).sum()
+        pull = -springs * np.where(bent > 1e-7, bent / np.sin(bent + 1e-300), 1.0)
+        by_t = pull[:, None] * along[:-1] - m * h * flux_T
+        by_t[:-1] += pull[1:, None] * t[1:]
+        g = np.concatenate([(by_t * ta).sum(axis=1), (by_t * tb).sum(axis=1)])
+        return value * 1e3, g * 1e3
+
+    def room(angles):
+        return wall(h * np.cumsum(tangents(angles)[0], axis=0))
+
+    start = np.concatenate([np.linspace(0.0, 0.6, links), np.linspace(0.0, 0.2, links)])
+    found = minimize(
+        energy, start, jac=True, method="SLSQP",
+        constraints={"type": "ineq", "fun": room},
+        options={"maxiter": 300, "ftol": 1e-10},
+    )  # fmt: skip
+    assert found.success
+    return h * tangents(found.x)[0].sum(axis=0), found.fun / 1e3
+
+
+def test_least_energy_of_a_chain_of_links_comes_to_the_same():
+    rod = round_rod(24.0, 10.0, remanence_mT=20.0)
+    tube = Tube(
+        name="turn", points_mm=helix(12.0, 30.0, 0.5), radius_mm=1.2,
+        direction=(1.0, 0.0, 0.0),
+    )  # fmt: skip
+    flux_T = 0.02 * np.array([0.3, 0.5, 0.6])
+    field = Field(
+        Uniform(
+            flux_mT=1e3 * np.linalg.norm(flux_T),
+            angle_deg=math.degrees(math.atan2(0.5, 0.3)),
+            elevation_deg=math.degrees(math.asin(0.6 / math.sqrt(0.7))),
+        )
+    )
+    last = navigate(rod, tube, field, step_mm=1.0, refine=False).steps[-1]
+    place = tube.at(np.linspace(0.0, tube.length_mm, 1500))[0]
+
+    def wall(points):
+        square = ((points[:, None] - place) ** 2).sum(axis=2).min(axis=1)
+        return 0.7 - np.sqrt(square)
+
+    coarse, fine = (chain(rod, 24.0, n, flux_T, wall) for n in (10, 20))
+    tip = fine[0] + (fine[0] - coarse[0]) / 3.0
+    energy = fine[1] + (fine[1] - coarse[1]) / 3.0
+    assert len(last.contacts) >= 2
+    assert np.linalg.norm(tip - last.tip_mm) < 0.02
+    assert energy == pytest.approx(last.energy_Nmm, rel=2e-3)
+
+
+@pytest.mark.parametrize("tube", [helix(10.0, 20.0, 0.6), [(0, 0, 0), (40, 0, 0)]])
+def test_the_work_of_the_hand_is_stored(tube):
+    lumen = Tube(name="t", points_mm=tube, radius_mm=2.0)
+    lost = []
+    for step_mm in (1.0, 0.5):
+        passage = navigate(gmc(2), lumen, OBLIQUE, step_mm=step_mm, refine=False)
+        push = np.array([step.push_N for step in passage.steps])
+        at = np.array([step.insertion_mm for step in passage.steps])
+        work = np.sum(np.diff(at) * (push[1:] + push[:-1]) / 2.0)
+        stored = passage.steps[-1].energy_Nmm - passage.steps[0].energy_Nmm
+        lost.append(abs(work - stored))
+    assert lost[1] < 6e-3 * abs(stored)
+    assert lost[1] < 0.6 * lost[0]
