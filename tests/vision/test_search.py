@@ -53,6 +53,12 @@ def measured(scene, **known):
     )  # fmt: skip
 
 
+def off(found, line=LINE):
+    """RMS distance from the true axis, mm."""
+    points = np.column_stack([found.points["x_mm"], found.points["y_mm"]])
+    return np.sqrt(np.mean(signed_distance(points, line.points_mm) ** 2))
+
+
 def bar(x, y, width, height):
     corners = [[x, y], [x + width, y], [x + width, y + height], [x, y + height]]
     return np.array(corners, dtype=float)
@@ -98,8 +104,7 @@ CLUTTER = {
 def test_the_rod_is_measured_beside(what):
     found = measured(replace(PLAIN, **CLUTTER[what]))
     assert found.ok, found.reason
-    points = np.column_stack([found.points["x_mm"], found.points["y_mm"]])
-    assert np.sqrt(np.mean(signed_distance(points, LINE.points_mm) ** 2)) < 0.08
+    assert off(found) < 0.08
     assert found.length_mm == pytest.approx(LINE.length_mm, abs=0.08)
 
 
@@ -189,3 +194,44 @@ def test_the_root_is_under_the_edge_that_a_telephone_sees_over_it():
     along = (true[1] - true[0]) / np.hypot(*(true[1] - true[0]))
     assert abs((found.clamp_px - true[0]) @ along) < 0.8
     assert found.clamp_sd_mm < 0.05
+
+
+def test_a_rod_as_light_as_its_board_is_not_mistaken_for_its_shade():
+    light = SceneLight(
+        shadow_direction_deg=200.0, shadow_depth=0.6, slope=1.5, softness=0.1
+    )
+    scene = replace(PLAIN, rod_colour=RED, paper=GREEN_BOARD, light=light)
+    found = measured(scene)
+    assert found.ok, found.reason
+    assert found.length_mm == pytest.approx(26.0, abs=0.1)
+    assert off(found) < 0.1
+
+
+def test_a_dark_rod_in_the_clamp_does_not_hide_a_striped_one():
+    other = lying(-90.0, -16.0, -10.0, length_mm=8.0)
+    scene = replace(PLAIN, rod_colour=GREEN, rod_stripe=YELLOW, others=(other,))
+    found = measured(scene)
+    assert found.ok, found.reason
+    assert off(found) < 0.1
+
+
+@pytest.mark.parametrize("stub_mm", [0.5, 1.0])
+def test_a_stub_of_another_colour_belongs_to_the_rod(stub_mm):
+    """Stripes of 5 mm leave a short one of the second colour at the end."""
+    line = curve("arc", angle_deg=20.0, length_mm=15.0 + stub_mm)
+    found = measured(replace(
+        PLAIN, centreline=line, rod_colour=GREEN, rod_stripe=YELLOW
+    ))  # fmt: skip
+    assert found.ok, found.reason
+    assert found.length_mm == pytest.approx(15.0 + stub_mm, abs=0.1)
+
+
+def test_the_rod_ends_where_its_own_close_shade_begins():
+    light = SceneLight(
+        shadow_direction_deg=0.0, shadow_depth=0.65, slope=0.8, softness=0.25
+    )
+    line = curve("straight", length_mm=22.0)
+    clamp = replace(CLAMP, pose=replace(CLAMP.pose, angle_deg=0.0))
+    found = measured(replace(PLAIN, clamp=clamp, centreline=line, light=light))
+    assert found.ok, found.reason
+    assert found.length_mm == pytest.approx(22.0, abs=0.1)

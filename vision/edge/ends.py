@@ -39,10 +39,12 @@ def find_ends(
     middle = median(edges.middle[near]) if near.any() and turn == 0 else 0.0
     end = seen.good & (seen.s > curve.s[-1] - 1.5 * width)
     taper = median(edges.width[end]) if end.sum() > 3 else width
+    face = None if walls is None else _face_seen(state, walls)
     for far in (reach, 1.3 * width):  # the end of a taper may lie farther on
         tip = find_tip(
             grey, curve, expected=state.last + outwards, width=min(width, taper),
-            blur=state.blur, reach=far, middle=middle, sign=sign, fine=turn >= _FINE,
+            blur=state.blur, reach=far, middle=middle, face=face, sign=sign,
+            fine=turn >= _FINE,
         )  # fmt: skip
         if tip is not None:
             break
@@ -61,6 +63,13 @@ def find_ends(
         fine=turn >= _FINE,
     )  # fmt: skip
     return tip, lines, _first(lines, state.face_px)
+
+
+def _face_seen(state: State, walls: Walls) -> float:
+    """Return how much of the end face is seen: a right angle on, it is a side wall."""
+    points, theta = state.curve.at(np.array([state.last]))
+    wall, _ = walls(points, theta + 0.5 * np.pi, state.width)
+    return max(float(wall[0]), 0.0)
 
 
 def _to_end_of_face(tip: EndFace, state: State, seen: Seen, walls: Walls) -> EndFace:

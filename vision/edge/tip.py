@@ -30,6 +30,9 @@ _SHARE = 0.62
 """Part of the width that the lanes cover: clear of blurred or rounded corners."""
 _SHADE = 0.3
 """Light of the deepest shade on paper, over paper's above the rod's."""
+_STEP_SIDE_PX, _SOFTER, _FACE_SEEN = 2.0, 1.8, 1.3
+"""How far about a place its slope is looked for; how much less steep a shade ends than
+its rod; and how much more of an end face may be seen than its width tells."""
 _LANES = np.linspace(-0.5, 0.5, 13) * _SHARE
 
 
@@ -42,6 +45,7 @@ def find_tip(
     blur: float,
     reach: float,
     middle: float = 0.0,
+    face: float | None = None,
     sign: float = 1.0,
     fine: bool = True,
 ) -> EndFace | None:
@@ -59,6 +63,8 @@ def find_tip(
         Width of the rod and standard deviation of the blur, px.
     middle : float
         Offset of the lanes' centre from the curve, px.
+    face : float or None
+        How much of the end face is seen, px; None where that is not known.
     sign : float
         -1 for a light rod.
     fine : bool
@@ -79,7 +85,7 @@ def find_tip(
     )
     across = middle + _LANES * width
     light = lanes(grey, curve, s, across, sign)
-    place = _rough_end(light[3:-3].mean(axis=0), s, expected, reach, near, inner)
+    place = _rough_end(light[3:-3].mean(axis=0), s, expected, reach, near, inner, face)
     if place is None:
         return None
     crossing = crossings_of(
@@ -94,12 +100,14 @@ def find_tip(
 
 
 def _rough_end(
-    profile: Array, s: Array, expected: float, reach: float, near: float, inner: float
-) -> float | None:
+    profile: Array, s: Array, expected: float, reach: float, near: float, inner: float,
+    face: float | None,
+) -> float | None:  # fmt: skip
     """Find where the mean lane leaves the rod: the first time, going outwards.
 
     Between rod and paper may lie the rod's shade, darker than half: then the rod ends
-    where the shade begins.
+    where the shade begins. So may its end face, but no farther than it is seen; where
+    that is not known, a shade ends less steeply.
     """
     rod = median(profile[s < expected - reach - near])
     paper = quantile(profile[s > expected], 0.75)
@@ -112,4 +120,12 @@ def _rough_end(
         return None
     end = float(s[hits[0]])
     shade = float(s[np.flatnonzero((light > _SHADE) & within)[0]])
-    return shade if end - shade > near + inner else end
+    if face is None:
+        soft = _SOFTER * _rise(light, s, end) < _rise(light, s, shade)
+        face = 0.0 if soft else inner
+    return shade if end - shade > near + _FACE_SEEN * face else end
+
+
+def _rise(light: Array, s: Array, place: float) -> float:
+    """Return the steepest rise near a place, per sample."""
+    return float(np.diff(light[np.abs(s - place) <= _STEP_SIDE_PX]).max())

@@ -15,13 +15,14 @@ from ..camera.find_tag import TaggedClamp, tagged_clamp
 from ..camera.oriented import oriented
 from ..edge.state import LostError
 from ..find.choose import find_rod, search_rod
+from ..find.coloured import shows_another
 from ..find.ground import View
 from ..find.rod import Candidate
 from ..find.track import Start, start_curve
 from ..measurement import Measurement, failure
 from ..picture.photo import Photo
 from .bare import flattened
-from .quality import TIP_GOES_ON, doubts, refusal
+from .quality import OTHER_ROD, TIP_GOES_ON, doubts, refusal
 from .refine import refine
 from .setting import Setting
 from .specimen_frame import measurement
@@ -34,6 +35,10 @@ BROKEN = (
 )  # fmt: skip
 """What numerics raise on pictures that hold no rod after all."""
 
+
+PALE = 0.3
+"""Light of a rod, over the paper's, above which it may be a shade, or a face of
+something: all levels and colours are then looked at."""
 
 SMOOTH = 0.12
 """Blur for a rough rod, in widths: its two edges do not feel each other yet."""
@@ -91,8 +96,9 @@ def _measure(photo: Photo, setting: Setting) -> Measurement:
     sought = setting.sought(photo.size_px)
     quick, doubt = None, LostError("no_rod", "nothing stands out from the background")
     try:
-        quick = measure_candidate(photo, setting, *find_rod(photo, sought))
-        if _is_sure(quick):
+        rod, view = find_rod(photo, sought)
+        quick = measure_candidate(photo, setting, rod, view)
+        if _is_sure(quick, rod) and not shows_another(photo, rod):
             return quick
     except LostError as lost:
         doubt = lost
@@ -102,24 +108,44 @@ def _measure(photo: Photo, setting: Setting) -> Measurement:
         whole = measure_candidate(photo, setting, *search_rod(photo, sought))
     except (LostError, *BROKEN) as lost:
         if quick is not None:
-            return quick
+            return _doubted(quick)
         if isinstance(lost, LostError) and lost.seen_px:
             raise
         raise _empty(photo) or doubt from None
     return whole if quick is None else _better(quick, whole)
 
 
-def _is_sure(quick: Measurement) -> bool:
+def _is_sure(quick: Measurement, rod: Candidate) -> bool:
     """Whether one level of lightness may have shown the whole rod, and no shade."""
-    return TIP_GOES_ON not in quick.flags and "clamp_at_border" not in quick.flags
+    doubts = {TIP_GOES_ON, "clamp_at_border"} & set(quick.flags)
+    return not doubts and rod.ratio < PALE
+
+
+def _doubted(quick: Measurement) -> Measurement:
+    """Return what one level shows and all levels together do not."""
+    if {TIP_GOES_ON, "clamp_at_border", OTHER_ROD} & set(quick.flags):
+        return quick
+    return replace(quick, flags=(*quick.flags, OTHER_ROD))
 
 
 def _better(quick: Measurement, whole: Measurement) -> Measurement:
     """Return the one of two measurements that is longer, or held by a clamp."""
-    if "clamp_at_border" not in quick.flags:
-        return whole if whole.length_px > quick.length_px else quick
-    held = not {"clamp_at_border", "no_clamp", "rough_edges"} & set(whole.flags)
-    return whole if held else quick
+    if "clamp_at_border" in quick.flags:
+        held = not {"clamp_at_border", "no_clamp", "rough_edges"} & set(whole.flags)
+        return whole if held else quick
+    return (
+        quick if _same(quick, whole) and quick.length_px >= whole.length_px else whole
+    )
+
+
+def _same(one: Measurement, other: Measurement) -> bool:
+    """Whether two measurements are of one rod: the middle of one lies on the other."""
+    middle = len(one.points["x_px"]) // 2
+    away = np.hypot(
+        other.points["x_px"] - one.points["x_px"][middle],
+        other.points["y_px"] - one.points["y_px"][middle],
+    )
+    return bool(away.min() < max(one.width_px, other.width_px))
 
 
 def measure_candidate(

@@ -68,6 +68,8 @@ class Refined:
         Lines at the clamp; None for a rod that enters at the border or floats.
     rough : bool
         Whether its edges wander, as a yarn's.
+    blur : float
+        Standard deviation of the blur, as its edges show it, px.
     settled : bool
         Whether the last pass still moved nothing.
     """
@@ -80,6 +82,7 @@ class Refined:
     tip: EndFace
     clamp: ClampLines | None
     rough: bool
+    blur: float
     settled: bool = True
 
     @property
@@ -168,7 +171,7 @@ def refine(
         fit=replace(fit, curve=curve), shaded=shaded, good=used, width=width,
         sigma_width=sigma_width, tip=replace(tip, s=tip.s - first),
         clamp=None if lines is None else lines.shifted(first), rough=state.rough,
-        settled=settled,
+        blur=state.blur, settled=settled,
     )  # fmt: skip
 
 

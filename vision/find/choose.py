@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -27,6 +27,10 @@ _SIZE = 1.6
 
 _AS_CLEAR = 0.6
 """Share of the levels, and of the worth, at which another thing is as likely."""
+
+_AS_LONG = 0.6
+"""Length over the rod's from which another thing cannot be told from it; a shorter one
+is a doubt."""
 
 _DARK = 0.25
 """Light of a rod, over the paper's, that no mix of colours tells much better."""
@@ -122,15 +126,14 @@ def search_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
         if not any(_is_shade(thing.best, other.best) for other in things)
     )
     rivals = [
-        other
+        other.best
         for other in things
-        if other is not first
-        and _rivals(first, other)
-        and not _is_shade(other.best, first.best)
+        if _rivals(first, other) and not _is_shade(other.best, first.best)
     ]
-    rod = first.best
-    if rivals:
-        raise _too_many([rod, *(other.best for other in rivals)], seen)
+    rod = replace(first.best, rivalled=bool(rivals))
+    alike = [other for other in rivals if other.length_px > _AS_LONG * rod.length_px]
+    if alike:
+        raise _too_many([rod, *alike], seen)
     if rod.root == "free" and sought.clamp != "none":
         raise LostError("no_clamp", _NO_CLAMP, seen)
     try:
@@ -179,7 +182,8 @@ def _rivals(first: Thing, other: Thing) -> bool:
     """Whether another thing could as well be the rod: of its size, held as it is."""
     one, two = first.best, other.best
     return (
-        0.5 < two.width_px / one.width_px < 2.0
+        not two.lies_on(one)
+        and 0.5 < two.width_px / one.width_px < 2.0
         and two.length_px > 0.4 * one.length_px
         and (one.root != "clamp" or two.root == "clamp")
         and len(other.seen) > _AS_CLEAR * len(first.seen)
@@ -200,7 +204,7 @@ def _choose(binary: Binary, sought: Sought) -> Candidate:
         rod = _likeliest(rods)
         _refuse_second(rod, rods)
         # What shows only where less is dark may be the clamp's shade: seek its root.
-        alike = best is None or _is_part(best, rod)
+        alike = best is None or best.lies_on(rod)
         if rod.root != "free" and alike:
             return _accept(rod)
         best = best or rod
@@ -216,12 +220,6 @@ def _levels(binary: Binary) -> list[float]:
     first = binary.threshold
     higher = [level for level in (0.6, 0.75) if level > first + 0.05]
     return [*higher, first] if binary.inverted else [first, *higher]
-
-
-def _is_part(one: Candidate, other: Candidate) -> bool:
-    """Whether a candidate's middle lies on another."""
-    middle = one.points_px[len(one.points_px) // 2]
-    return other.away(middle) < max(one.width_px, other.width_px)
 
 
 def _likeliest(rods: list[Candidate]) -> Candidate:

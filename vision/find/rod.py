@@ -61,6 +61,8 @@ class Candidate:
         Whether one of them, besides its root, is the border of the picture.
     ratio : float
         Light on it relative to the background.
+    rivalled : bool
+        Whether another thing in the picture may be the rod as well.
     """
 
     points_px: Array
@@ -70,6 +72,7 @@ class Candidate:
     contacts: int
     ratio: float
     leaves: bool = False
+    rivalled: bool = False
 
     @property
     def slenderness(self) -> float:
@@ -79,6 +82,11 @@ class Candidate:
     def away(self, point: Array) -> float:
         """Distance of a point (x, y) from the start curve, px."""
         return float(np.hypot(*(self.points_px - point).T).min())
+
+    def lies_on(self, other: Candidate) -> bool:
+        """Whether its middle lies on another: a part of it, or the same thing."""
+        middle = self.points_px[len(self.points_px) // 2]
+        return other.away(middle) < max(self.width_px, other.width_px)
 
 
 def find_candidates(binary: Binary) -> list[Candidate]:

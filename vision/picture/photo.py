@@ -42,7 +42,8 @@ class Photo:
         EXIF's 1 to 8, as the file notes it: how the sensor's picture was turned to be
         upright, as it is here; see `turn`.
     decode : callable, optional
-        Gives the pixels in colour, as `as_photo` takes them; see `colour`.
+        Gives the pixels in colour, as `as_photo` takes them; see `colour`. A file is
+        decoded for it once more, the first time.
     """
 
     grey: NDArray[np.float32]
@@ -53,17 +54,22 @@ class Photo:
         default=None, repr=False, compare=False
     )
 
-    def colour(self) -> NDArray[np.float32] | None:
+    def colour(
+        self, window: tuple[slice, slice] = (slice(None), slice(None))
+    ) -> NDArray[np.float32] | None:
         """Return linear blue, green and red, (h, w, 3); None for a grey picture.
 
-        A file is decoded for it once more: most photographs are measured without.
+        Parameters
+        ----------
+        window : tuple of slice
+            The rows and columns that are wanted; those that there are.
         """
         if self.decode is None:
             return None
         pixels = self.decode()
         if pixels.ndim != 3 or pixels.shape[2] < 3:
             return None
-        return _linear(np.ascontiguousarray(pixels[..., :3]), linear=False)
+        return _linear(np.ascontiguousarray(pixels[window][..., :3]), linear=False)
 
     @property
     def size_px(self) -> tuple[int, int]:
@@ -136,10 +142,12 @@ def decode_photo(
     pixels = _pixels(data, source, header, linear, page)
     photo = as_photo(pixels, source=source, linear=bool(linear))
     photo = replace(photo, orientation=header.orientation)
+    if _keeps_colour(data) and not linear:
+        return photo
     if linear or pixels.ndim != 2:  # transparent pixels are white there
         return replace(photo, decode=None)
     flags = cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH
-    return replace(photo, decode=partial(_decode, data, source, flags))
+    return replace(photo, decode=cache(partial(_decode, data, source, flags)))
 
 
 def _pixels(
@@ -149,6 +157,8 @@ def _pixels(
     if header.profile and not linear:
         flags = cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH
         return by_profile(_decode(data, source, flags, page), header, source)
+    if _keeps_colour(data):
+        return _decode(data, source, cv2.IMREAD_COLOR)
     flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH
     pixels = _decode(data, source, flags, page)
     if data[:8] == PNG and data[25] in (4, 6):
@@ -158,6 +168,14 @@ def _pixels(
     if header.white_is_zero:
         pixels = np.iinfo(np.uint16).max - pixels
     return pixels << _spare_bits(pixels, source, linear)
+
+
+def _keeps_colour(data: bytes) -> bool:
+    """Whether a file is a PNG of 8 bits in colour, without transparency.
+
+    To be decoded in grey takes it as long, and OpenCV then rounds down.
+    """
+    return data[:8] == PNG and data[24:26] == b"\x08\x02"
 
 
 def _spare_bits(pixels: NDArray[Any], source: str, linear: bool | None) -> int:
