@@ -56,6 +56,7 @@ def lumen(
                 "angle_deg": placed.pose.angle_deg,
                 "sd_mm": placed.sd_mm,
                 "sd_deg": placed.sd_deg,
+                "gates": found.gates,
                 "steps": rows.where(rows.notna(), None).to_dict("records"),
             }
         )
@@ -88,6 +89,8 @@ def _print(folder: Path, found: InLumen) -> None:
                 f"{held.found + held.missed}, {held.extra} more"
             )
         say(f"  {fed_mm:6.2f} mm in: {line}")
+    if found.lumen.gates:
+        say(f"  the tip passed: {', '.join(found.gates) or 'no gate'}")
     say(
         f"wrote {folder}/frames.csv, centrelines.csv, lumen.csv and lumen.png", err=True
     )

@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 
 CLOSE = 2.0
 """A gap below so many standard deviations is a contact."""
+EDGE_PX = 0.1
+"""What an edge beside a wall may be off by, besides its own deviation."""
 HOLE_MM = 1.0
 """Contacts on one wall that are nearer than this are one."""
 WIDEST = 0.8
@@ -126,8 +128,11 @@ def fed(
     nearest = np.argmin(room, axis=0)
     gap = np.min(room, axis=0) - half_mm
     arm = np.hypot(*(own - own.mean(axis=0)).T)
+    root_px = (float(middle_px[0, 0]), float(middle_px[0, 1]))
+    px_mm = calibration.mm_per_px(root_px, height_mm=axis_height_mm)
     sigma = np.sqrt(
         2.0 * points["sigma_mm"] ** 2
+        + (EDGE_PX * px_mm) ** 2
         + placed.sd_mm**2
         + (math.radians(placed.sd_deg) * arm) ** 2
         + wall_sd_mm**2

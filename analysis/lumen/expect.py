@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import InputError
 from ...sim import MagnetField, Support, UniformField
-from ...sim.navigate import Lumen, Passage, moving, navigate
+from ...sim.navigate import Lumen, Passage, crosses, moving, navigate
 from ...sim.navigate import Step as LumenStep
 from ..runs.data import RunData, Step
 from .contacts import HOLE_MM, Fed
@@ -92,6 +93,16 @@ def step_at(passage: Passage, fed_mm: float) -> LumenStep | None:
     """Return the step at an insertion; None if the rod did not come so far."""
     near = min(passage.steps, key=lambda step: abs(step.insertion_mm - fed_mm))
     return near if abs(near.insertion_mm - fed_mm) < 1e-6 else None
+
+
+def gates_passed(lumen: Lumen, tips_mm: Sequence[tuple[float, float]]) -> list[str]:
+    """Return the gates that a tip passed between its places, in order."""
+    return [
+        gate.name
+        for before, after in itertools.pairwise(tips_mm)
+        for gate in lumen.gates
+        if crosses(gate, before, after)
+    ]
 
 
 def agreement(seen: Fed, step: LumenStep) -> Agreement:

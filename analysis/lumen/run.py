@@ -31,7 +31,15 @@ from ...vision import (
 from ..runs.data import RunData
 from ..runs.load import load_run
 from .contacts import Fed, fed
-from .expect import Agreement, agreement, fed_mm_of, fed_steps, simulated, step_at
+from .expect import (
+    Agreement,
+    agreement,
+    fed_mm_of,
+    fed_steps,
+    gates_passed,
+    simulated,
+    step_at,
+)
 from .place import place
 
 if TYPE_CHECKING:
@@ -68,6 +76,13 @@ class InLumen:
     fed: dict[str, Fed]
     passage: Passage
     agreements: dict[str, Agreement]
+
+    @property
+    def gates(self) -> list[str]:
+        """Gates that the measured tip passed from photograph to photograph."""
+        seen = [self.fed.get(step.image) for step in fed_steps(self.run)]
+        tips = [tuple(one.points_mm[-1].tolist()) for one in seen if one is not None]
+        return gates_passed(self.lumen, tips)
 
 
 def measure_in_lumen(
@@ -169,6 +184,15 @@ def lumen_table(result: InLumen) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def _frame_cells(seen: Fed | None) -> tuple[float | None, int | None, str, str]:
+    """Return the cells of `FRAMES`."""
+    if seen is None:
+        return None, None, "", ""
+    walls = ";".join(touch.wall for touch in seen.touches)
+    places = ";".join(f"{touch.at_mm:.2f}" for touch in seen.touches)
+    return seen.fed_mm, len(seen.touches), walls, places
+
+
 def _write(folder: Path, result: InLumen, sources: Sequence[Path]) -> None:
     import pandas as pd
 
@@ -184,15 +208,8 @@ def _write(folder: Path, result: InLumen, sources: Sequence[Path]) -> None:
         )  # fmt: skip
         for name, column in zip(POINTS, columns, strict=True):
             lines.loc[rows, name] = np.asarray(column)
-    for row, image in frames["image"].items():
-        here = result.fed.get(str(image))
-        if here is None:
-            continue
-        walls = ";".join(touch.wall for touch in here.touches)
-        places = ";".join(f"{touch.at_mm:.2f}" for touch in here.touches)
-        values = here.fed_mm, len(here.touches), walls, places
-        for name, value in zip(FRAMES, values, strict=True):
-            frames.loc[row, name] = value
+    rows = [_frame_cells(result.fed.get(str(image))) for image in frames["image"]]
+    frames[list(FRAMES)] = pd.DataFrame(rows, index=frames.index)
     written = {
         "centrelines.csv": lines, "frames.csv": frames, "lumen.csv": lumen_table(result)
     }  # fmt: skip

@@ -39,7 +39,10 @@ GUIDE_MM = 10.0
 class Axis(Protocol):
     """What the bench asks of an axis: where it is."""
 
-    value: float | None
+    @property
+    def value(self) -> float | None:
+        """The last value that was set."""
+        ...
 
 
 class LumenBench(TwinBench):

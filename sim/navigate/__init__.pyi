@@ -29,3 +29,4 @@ from .steering import Steered as Steered
 from .steering import plan_of as plan_of
 from .steering import poses_text as poses_text
 from .steering import steer as steer
+from .walk import crosses as crosses

@@ -80,10 +80,14 @@ def moving(
 
 
 def _moved(field: Any, now: dict[str, float]) -> Field:
-    angle = {k: v for k, v in now.items() if k == "axis_angle_deg"}
-    sources = [
-        replace(source, **angle) if hasattr(source, "axis_angle_deg") else source
+    """Return magnets at another pose; sources that stand at a centre stay."""
+    return Field(
+        replace(source, **{k: v for k, v in now.items() if _takes(source, k)})
         for source in field.sources
-    ]
-    moved = Field(sources)
-    return moved.at_gap(now["gap_mm"]) if "gap_mm" in now else moved
+    )
+
+
+def _takes(source: Any, key: str) -> bool:
+    if key == "gap_mm":
+        return source.follows_gap or getattr(source, "gap_mm", None) is not None
+    return hasattr(source, key)

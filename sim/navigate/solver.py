@@ -109,20 +109,10 @@ def navigate(
         made = tube_case(specimen, lumen, field, support, elements)
         walk = TubeWalk(made, step_mm, limit_N)
     else:
-        _check_plane(lumen, field, support)
-        lumen.check_rod(max(specimen.sides_mm))
-        case = Case(
-            specimen=specimen,
-            lumen=lumen,
-            field=field,
-            sections=sections_of(specimen, support),
-            walls=lumen.packed(specimen.length_mm, DEEP * max(specimen.sides_mm)),
-            pieces=lumen.pieces,
-            friction=friction,
-            elements=elements,
-            tip=tip,
-        )
-        walk = PlanarWalk(case, step_mm, limit_N)
+        walk = planar_walk(
+            specimen, lumen, field, step_mm=step_mm, friction=friction,
+            support=support, limit_N=limit_N, elements=elements, tip=tip,
+        )  # fmt: skip
     for target_mm in _way(way_mm, specimen.length_mm):
         if not walk.go_to(target_mm):
             break
@@ -140,6 +130,41 @@ def navigate(
         events=tuple(walk.events),
         error_mm=walk.error_mm() if refine else math.nan,
     )
+
+
+def planar_walk(
+    specimen: Specimen,
+    lumen: Lumen,
+    field: FieldOfWay,
+    *,
+    step_mm: float,
+    friction: float,
+    support: Support = NO_SUPPORT,
+    limit_N: float = math.inf,
+    elements: int = ELEMENTS,
+    tip: tuple[float, float, float] | None = None,
+) -> PlanarWalk:
+    """Return a rod before its way through a planar lumen; parameters as of `navigate`.
+
+    Raises
+    ------
+    InputError
+        If it cannot enter, or would be lifted out of the plane.
+    """
+    _check_plane(lumen, field, support)
+    lumen.check_rod(max(specimen.sides_mm))
+    case = Case(
+        specimen=specimen,
+        lumen=lumen,
+        field=field,
+        sections=sections_of(specimen, support),
+        walls=lumen.packed(specimen.length_mm, DEEP * max(specimen.sides_mm)),
+        pieces=lumen.pieces,
+        friction=friction,
+        elements=elements,
+        tip=tip,
+    )
+    return PlanarWalk(case, step_mm, limit_N)
 
 
 def _way(way_mm: object, longest_mm: float) -> tuple[float, ...]:

@@ -25,6 +25,7 @@ from ..picture.photo import Photo
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
+Waves = NDArray[np.complex128]
 Outline = tuple[Array, Array]
 """Points and normals."""
 
@@ -189,7 +190,10 @@ def _shifted(pose: Pose, by_mm: Array) -> Pose:
 
 
 def _score(
-    waves: tuple[Array, Array], at: Array, along: Array, shape: tuple[int, ...]
+    waves: tuple[NDArray[np.complex128], NDArray[np.complex128]],
+    at: Array,
+    along: Array,
+    shape: tuple[int, ...],
 ) -> Array:
     """Return how well the outline's normals agree with the steps, for each shift."""
     total = np.zeros((shape[0], shape[1] // 2 + 1), dtype=complex)

@@ -10,7 +10,9 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from magbend.core.errors import ConfigError, InputError
-from magbend.sim import UniformField, gmc
+from magbend.core.magnet import Magnet
+from magbend.sim import Field, MagnetField, UniformField, gmc
+from magbend.sim.fields import cuboid_of
 from magbend.sim.navigate import (
     Lumen,
     Wall,
@@ -244,3 +246,12 @@ def test_walls_of_too_many_pieces_are_refused_before_they_are_drawn():
         Lumen(
             name="fine", walls=(Wall("upper", polyline(points)),), inside_mm=(1.0, 0.0)
         )
+
+
+def test_poses_move_a_magnet_whatever_gap_it_had():
+    cube = Magnet.cube(55.0, 1.305)
+    turned = Magnet.cube(55.0, 1.305, axis_angle_deg=70.0)
+    pose = {"insertion_mm": 0.0, "gap_mm": 45.0, "axis_angle_deg": 70.0}
+    for start in (MagnetField(magnet=cube, gap_mm=100.0), Field(cuboid_of(cube))):
+        there = moving(start, [pose])(3.0)
+        assert there == Field(MagnetField(magnet=turned, gap_mm=45.0).sources)
