@@ -31,6 +31,7 @@ import math
 
 from ...core.jit import njit
 from ..magnet.flux import PART, field_at, is_uniform
+from .taylor import advance, column_step, sample, series, substeps
 
 H, E, M, WX, WY = 0, 1, 2, 3, 4
 """Columns of a rod."""
@@ -41,159 +42,11 @@ SPARED, SWING = 9, 10
 others were spared (`spare`), and how the tip's load swings with its place."""
 GROWN = 1e16
 """Square of the growth from which on `spare` has something to do."""
+TURN = 1e-11
+"""Turns of the frame up to which come from rounding of the tip's place."""
 MAX_ORDER = 24
-MOST_STEPS = 1500
-"""Most steps of a section; more is asked for only where an iteration runs away."""
 SERIES = 4
 """Series kept of a step: theta, q, sin, cos; and the same of every column."""
-
-
-@njit(**PART, fastmath={"contract"})
-def series(h, order, X, T):  # type: ignore[no-untyped-def]
-    """Expand the state X over a step of length `h`.
-
-    Parameters
-    ----------
-    h : float
-        Length of the step.
-    order : int
-        Order of the series.
-    X : ndarray, shape (11,)
-        The state where the step begins.
-    T : ndarray, shape (4, order + 1 or more)
-        Receives the series of theta, q, sin, cos in powers of tau / h.
-    """
-    he = h * X[6]
-    px = h * X[4]
-    py = h * X[5]
-    wx = h * h * X[7]
-    wy = h * h * X[8]
-    T[0, 0] = X[0]
-    T[1, 0] = X[1]
-    T[2, 0] = math.sin(X[0])
-    T[3, 0] = math.cos(X[0])
-    for k in range(order):
-        f = 1.0 / (k + 1)
-        push = px * T[2, k] - py * T[3, k]
-        if k > 0:
-            push += wx * T[2, k - 1] - wy * T[3, k - 1]
-        sine = 0.0
-        cosine = 0.0
-        for j in range(k + 1):
-            sine += T[1, j] * T[3, k - j]
-            cosine += T[1, j] * T[2, k - j]
-        T[0, k + 1] = he * T[1, k] * f
-        T[1, k + 1] = push * f
-        T[2, k + 1] = he * sine * f
-        T[3, k + 1] = -he * cosine * f
-
-
-@njit(**PART, fastmath={"contract"})
-def advance(h, order, X, T):  # type: ignore[no-untyped-def]
-    """Move the state X to the end of the step whose `series` is in T."""
-    theta = q = x = y = 0.0
-    for k in range(order, 0, -1):
-        f = 1.0 / k
-        theta += T[0, k]
-        q += T[1, k]
-        x += T[3, k - 1] * f
-        y += T[2, k - 1] * f
-    X[0] += theta
-    X[1] += q
-    X[2] -= h * x
-    X[3] -= h * y
-    X[4] += h * X[7]
-    X[5] += h * X[8]
-
-
-@njit(**PART, fastmath={"contract"})
-def column_step(h, order, X, T, D, C):  # type: ignore[no-untyped-def]
-    """Move four columns over a step, before the state itself moves.
-
-    Four, written out, stay in registers: a third of the time that a loop takes which
-    keeps its sums in memory.
-
-    Parameters
-    ----------
-    h, order, X, T
-        As of `series`, which comes first.
-    D : ndarray, shape (11, 4)
-        Derivatives of the state.
-    C : ndarray, shape (order + 1 or more, 4, 4)
-        Receives their series: theta, q, and the products of theta with cos and -sin.
-    """
-    he = h * X[6]
-    px = h * X[4]
-    py = h * X[5]
-    wx = h * h * X[7]
-    wy = h * h * X[8]
-    for a in range(4):
-        C[0, 0, a] = D[0, a]
-        C[0, 1, a] = D[1, a]
-    for k in range(order):
-        u0 = u1 = u2 = u3 = 0.0
-        v0 = v1 = v2 = v3 = 0.0
-        for j in range(k + 1):
-            c = T[3, k - j]
-            s = T[2, k - j]
-            u0 += c * C[j, 0, 0]
-            u1 += c * C[j, 0, 1]
-            u2 += c * C[j, 0, 2]
-            u3 += c * C[j, 0, 3]
-            v0 -= s * C[j, 0, 0]
-            v1 -= s * C[j, 0, 1]
-            v2 -= s * C[j, 0, 2]
-            v3 -= s * C[j, 0, 3]
-        C[k, 2, 0] = u0
-        C[k, 2, 1] = u1
-        C[k, 2, 2] = u2
-        C[k, 2, 3] = u3
-        C[k, 3, 0] = v0
-        C[k, 3, 1] = v1
-        C[k, 3, 2] = v2
-        C[k, 3, 3] = v3
-        f = 1.0 / (k + 1)
-        s0 = h * T[2, k]
-        c0 = h * T[3, k]
-        hq = h * T[1, k]
-        for a in range(4):
-            push = px * C[k, 2, a] - py * C[k, 3, a] + D[4, a] * s0 - D[5, a] * c0
-            if k > 0:
-                push += wx * C[k - 1, 2, a] - wy * C[k - 1, 3, a]
-                push += h * h * (D[7, a] * T[2, k - 1] - D[8, a] * T[3, k - 1])
-            C[k + 1, 0, a] = (he * C[k, 1, a] + hq * D[6, a]) * f
-            C[k + 1, 1, a] = push * f
-    for a in range(4):
-        theta = q = x = y = 0.0
-        for k in range(order, 0, -1):
-            f = 1.0 / k
-            theta += C[k, 0, a]
-            q += C[k, 1, a]
-            x += C[k - 1, 3, a] * f
-            y += C[k - 1, 2, a] * f
-        D[0, a] += theta
-        D[1, a] += q
-        D[2, a] -= h * x
-        D[3, a] -= h * y
-        D[4, a] += h * D[7, a]
-        D[5, a] += h * D[8, a]
-
-
-@njit(**PART)
-def substeps(h, X, step):  # type: ignore[no-untyped-def]
-    """Return how many Taylor steps a section needs.
-
-    The series converges up to about pi / 2 in units of 1 / sqrt(e P), the distance of
-    the pendulum's poles from the real axis; `step` is what one step takes, in the same
-    units.
-    """
-    e = X[6]
-    p0 = math.hypot(X[4], X[5])
-    p1 = math.hypot(X[4] + h * X[7], X[5] + h * X[8])
-    z = h * math.sqrt(e * max(p0, p1) + 0.25 * e * e * X[1] * X[1])
-    if not z < MOST_STEPS * step:
-        return MOST_STEPS
-    return max(1, math.ceil(z / step))
 
 
 @njit(**PART)
@@ -206,7 +59,10 @@ def enter_section(rod, i, load, u, columns, X, D):  # type: ignore[no-untyped-de
     X[6] = rod[i, E]
     X[7] = load * wx
     X[8] = load * wy
-    if columns > 3:
+    if columns > 1:
+        for a in range(1, 3):
+            D[7, a] = load * wy * D[SWING, a]
+            D[8, a] = -load * wx * D[SWING, a]
         D[7, 3] = wx
         D[8, 3] = wy
 
@@ -223,39 +79,73 @@ def begin(u, columns, X, D):  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
-def turn_frame(b, scale, u, X, columns, D):  # type: ignore[no-untyped-def]
-    """Turn the frame into the tip's load, keeping the tip's direction; set its columns.
+def turn_frame(b, scale, u, X):  # type: ignore[no-untyped-def]
+    """Turn the frame into the tip's load, keeping the tip's direction.
 
-    A turn as small as rounding is left out: gamma may be smaller still.
+    After a turn that comes from rounding it is gamma that is kept, which may be smaller
+    still.
     """
     turn = math.atan2(scale * b[1], scale * b[0]) - u[3]
     turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
-    if (b[0] != 0.0 or b[1] != 0.0) and scale != 0.0 and abs(turn) > 4e-15:
-        u[0] -= turn
+    if (b[0] != 0.0 or b[1] != 0.0) and scale != 0.0:
         u[3] += turn
-        X[0] = u[0]
-    if columns > 1:
-        cf = math.cos(u[3])
-        sf = math.sin(u[3])
-        D[2, 1] = cf
-        D[3, 1] = -sf
-        D[2, 2] = sf
-        D[3, 2] = cf
+        if abs(turn) > TURN:
+            u[0] -= turn
+            X[0] = u[0]
     X[9] = b[0]
     X[10] = b[1]
 
 
 @njit(**PART)
-def _hold_gamma(b, D):  # type: ignore[no-untyped-def]
-    """Make the columns of x_L and y_L those at a fixed gamma, as the load swings.
-
-    At a fixed direction of the tip they would be those of gamma, nearly, times what
-    the load swings: gamma grows exponentially along a long rod, and drowns the rest.
-    """
+def _swing(b, D):  # type: ignore[no-untyped-def]
+    """Set by how much the load at the tip, and the frame with it, swings."""
     size2 = b[0] * b[0] + b[1] * b[1]
     if size2 > 0.0:
-        D[0, 1] = D[SWING, 1] = (b[0] * b[3] - b[1] * b[2]) / size2
-        D[0, 2] = D[SWING, 2] = (b[0] * b[4] - b[1] * b[3]) / size2
+        D[SWING, 1] = (b[0] * b[3] - b[1] * b[2]) / size2
+        D[SWING, 2] = (b[0] * b[4] - b[1] * b[3]) / size2
+
+
+@njit(**PART)
+def _moved(a, cf, sf, X, D):  # type: ignore[no-untyped-def]
+    """Return what column `a` does to the position, in the frame as it stands.
+
+    The columns of x_L and y_L are in a frame that swings and shifts with the tip: at a
+    fixed gamma nothing grows in them but by the size of the load. In the fixed frame
+    rounding would, as exponentially along a long rod as gamma does.
+    """
+    dx = D[2, a] - D[SWING, a] * X[3]
+    dy = D[3, a] + D[SWING, a] * X[2]
+    if a == 1:
+        dx += cf
+        dy -= sf
+    elif a == 2:
+        dx += sf
+        dy += cf
+    return dx, dy
+
+
+@njit(**PART)
+def _close(u, X, D):  # type: ignore[no-untyped-def]
+    """Turn the columns of x_L and y_L into those of the fixed frame."""
+    cf, sf = math.cos(u[3]), math.sin(u[3])
+    for a in range(1, 3):
+        D[2, a], D[3, a] = _moved(a, cf, sf, X, D)
+        D[0, a] += D[SWING, a]
+
+
+@njit(**PART)
+def _determinant(u, X, D, columns):  # type: ignore[no-untyped-def]
+    """Return the Jacobi determinant (`jacobi`) within the march."""
+    if columns == 1:
+        return D[0, 0]
+    cf, sf = math.cos(u[3]), math.sin(u[3])
+    x1, y1 = _moved(1, cf, sf, X, D)
+    x2, y2 = _moved(2, cf, sf, X, D)
+    return (
+        D[0, 0] * (x1 * y2 - x2 * y1)
+        - (D[0, 1] + D[SWING, 1]) * (D[2, 0] * y2 - x2 * D[3, 0])
+        + (D[0, 2] + D[SWING, 2]) * (D[2, 0] * y1 - x1 * D[3, 0])
+    )
 
 
 @njit(**PART)
@@ -295,9 +185,9 @@ def add_load(rod, field, i, load, u, columns, X, D):  # type: ignore[no-untyped-
     y = u[2] + sf * X[2] + cf * X[3]
     b = field_at(field, x, y)
     if i == 0:
-        turn_frame(b, load * m, u, X, columns, D)
+        turn_frame(b, load * m, u, X)
         if columns > 1 and m != 0.0:
-            _hold_gamma(b, D)
+            _swing(b, D)
         cf = math.cos(u[3])
         sf = math.sin(u[3])
     along = cf * b[0] + sf * b[1]
@@ -309,46 +199,17 @@ def add_load(rod, field, i, load, u, columns, X, D):  # type: ignore[no-untyped-
     if columns < 2:
         return
     for a in range(columns):
-        dx = cf * D[2, a] - sf * D[3, a]
-        dy = sf * D[2, a] + cf * D[3, a]
+        px, py = _moved(a, cf, sf, X, D)
+        dx = cf * px - sf * py
+        dy = sf * px + cf * py
         fx = load * m * (b[2] * dx + b[3] * dy)
         fy = load * m * (b[3] * dx + b[4] * dy)
         if a == 3:
             fx += m * b[0]
             fy += m * b[1]
-        D[4, a] += cf * fx + sf * fy
-        D[5, a] += cf * fy - sf * fx
-
-
-@njit(**PART, fastmath={"contract"})
-def sample(s, k, reached, h, last, order, x0, y0, phi, X, T, out):  # type: ignore[no-untyped-def]
-    """Fill `out` at the stations within a step; return the next station, or -1.
-
-    At a joint the curvature is the one of the section that begins there. Of T the sin
-    and cos are integrated in place.
-    """
-    if k < 0 or not (last or 1.0 - s[k] <= reached + h + 1e-13):
-        return k
-    for a in range(order):
-        f = h / (a + 1)
-        T[2, a] *= f
-        T[3, a] *= f
-    while k >= 0 and (last or 1.0 - s[k] <= reached + h + 1e-13):
-        r = (1.0 - s[k] - reached) / h
-        theta = T[0, order]
-        q = T[1, order]
-        x = y = 0.0
-        for a in range(order - 1, -1, -1):
-            theta = theta * r + T[0, a]
-            q = q * r + T[1, a]
-            x = x * r + T[3, a]
-            y = y * r + T[2, a]
-        out[0, k] = x0 - r * x
-        out[1, k] = y0 - r * y
-        out[2, k] = theta + phi
-        out[3, k] = -q * X[6]
-        k -= 1
-    return k
+        D[4, a] += cf * fx + sf * fy + load * m * across * D[SWING, a]
+        if i > 0 or load * m == 0.0:  # the frame swings with the load at the tip
+            D[5, a] += cf * fy - sf * fx - load * m * along * D[SWING, a]
 
 
 @njit(**PART)
@@ -408,7 +269,7 @@ def march(rod, field, load, u, order, step, columns, limit, s, count, X, D, T, C
             advance(h, order, X, T)
             if columns > 1:
                 spare(X, D)
-            if columns > 0 and (jacobi(D, columns) > 0.0) != positive:
+            if columns > 0 and (_determinant(u, X, D, columns) > 0.0) != positive:
                 positive = not positive
                 zeros += 1
             if not abs(X[0]) < limit:
@@ -416,6 +277,8 @@ def march(rod, field, load, u, order, step, columns, limit, s, count, X, D, T, C
             last = i + 1 == rod.shape[0] and j + 1 == n
             k = sample(s, k, reached, h, last, order, x0, y0, u[3], X, T, out)
             reached += h
+    if columns > 1:
+        _close(u, X, D)
     return zeros
 
 

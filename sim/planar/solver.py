@@ -50,8 +50,9 @@ higher order while the shape is filled."""
 
 MAX_REACH = 200.0
 """Largest sum of h sqrt(e P), the length of the rod in units of its boundary layer."""
-MAX_REACH_NEWTON = 40.0
-"""The same where weight, a magnet or mixed signs need all three unknowns."""
+SURE_REACH = 40.0
+"""Up to which rods that weight or unlike sections bend between their ends are solved,
+too: beyond, the tip no longer fixes the root, and some are refused."""
 ORDER = 16
 STEP = 0.3
 ROUNDING = 2e-14
@@ -153,8 +154,7 @@ def _solve_row(  # type: ignore[no-untyped-def]
         if k == 0 and cold:
             found[3] = X[9]
             found[4] = X[10]
-            most = MAX_REACH if simple else MAX_REACH_NEWTON
-            if not _reach(rod, math.hypot(X[9], X[10])) < most:
+            if not _reach(rod, math.hypot(X[9], X[10])) < MAX_REACH:
                 found[0] = TOO_STRONG
                 return
             if zeros > 0 and not simple:
@@ -334,7 +334,7 @@ def _solve_by_following(
         found[0, 0] = GONE if index == -1 else FAILED
         found[0, 6] = load
     failed = found[0, 0] == FAILED
-    if failed and reach_there(rods[0], fields[0], u[0]) > MAX_REACH_NEWTON:
+    if failed and reach_there(rods[0], fields[0], u[0]) > SURE_REACH:
         found[0, 0] = TOO_STRONG
 
 
@@ -395,9 +395,9 @@ def failure(
     if outcome == TOO_STRONG:
         return InputError(
             "the load on the rod (flux_mT, remanence_mT, weight) must be less than "
-            "1600 times its stiffness EI / L^2, or 40000 times in a uniform field "
-            "without weight; instead received one beyond it: check E_MPa, side_mm and "
-            "flux_mT"
+            "40000 times its stiffness EI / L^2, or 1600 times where sections differ "
+            "in remanence or weight acts; instead received one beyond it: check E_MPa, "
+            "side_mm and flux_mT"
         )
     return SolverError(
         f"no equilibrium of {specimen.name!r} could be followed beyond "

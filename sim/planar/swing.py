@@ -19,17 +19,8 @@ import numpy as np
 
 from ...core.jit import njit
 from ..magnet.flux import PART, field_at
-from .march import (
-    STATE,
-    H,
-    M,
-    add_load,
-    advance,
-    begin,
-    enter_section,
-    series,
-    substeps,
-)
+from .march import STATE, H, M, add_load, begin, enter_section
+from .taylor import advance, series, substeps
 
 ORDER = 10
 """Enough for the sign of a determinant."""

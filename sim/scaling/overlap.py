@@ -85,10 +85,12 @@ def _shared(a: Array, b: Array) -> Array | None:
 
 def _points(body: Array) -> Array:
     """Return points of a body in its own frame, shape (n, 3)."""
+    points: Array = _CUBE * body[1:4]
     if body[0] == flux.COIL:
-        return _WINDING * [body[1], body[1], body[3]]
-    half = np.full(3, body[1]) if body[0] == flux.DIPOLE else body[1:4]
-    return _CUBE * half
+        points = _WINDING * np.array([body[1], body[1], body[3]])
+    elif body[0] == flux.DIPOLE:
+        points = _CUBE * body[1]
+    return points
 
 
 def _within(body: Array, points: Array) -> NDArray[np.bool_]:

@@ -9,21 +9,8 @@ import numpy as np
 from ...core.jit import njit
 from ..magnet.flux import PART, field_at, plane_source, source_at, sources_in
 from ..planar.follow import solve3
-from ..planar.march import (
-    STATE,
-    WX,
-    WY,
-    E,
-    H,
-    M,
-    add_load,
-    advance,
-    begin,
-    column_step,
-    enter_section,
-    series,
-    substeps,
-)
+from ..planar.march import STATE, SWING, WX, WY, E, H, M, add_load, begin, enter_section
+from ..planar.taylor import advance, column_step, series, substeps
 
 
 @njit(**PART)
@@ -48,7 +35,7 @@ def _field_change(field, changes, x, y, parts):  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
-def _load_columns(field, m, dm, changes, x, y, cf, sf, D):  # type: ignore[no-untyped-def]
+def _load_columns(field, m, dm, changes, at_tip, x, y, cf, sf, X, D):  # type: ignore[no-untyped-def]
     """Add to all columns the change of the load m B(r) of the point (x, y)."""
     b = field_at(field, x, y)
     parts = np.empty((sources_in(field), 5))
@@ -57,29 +44,54 @@ def _load_columns(field, m, dm, changes, x, y, cf, sf, D):  # type: ignore[no-un
         part = plane_source(field, i, x, y, own, one)
         for k in range(5):
             parts[i, k] = part[k]
+    along = cf * b[0] + sf * b[1]
+    across = 0.0 if at_tip and m != 0.0 else cf * b[1] - sf * b[0]
     for n in range(D.shape[0]):
         for a in range(4):
-            dx = cf * D[n, 2, a] - sf * D[n, 3, a]
-            dy = sf * D[n, 2, a] + cf * D[n, 3, a]
+            px, py = _moved(n, a, D[n, 2, a], D[n, 3, a], X[2], X[3], cf, sf, D)
+            dx = cf * px - sf * py
+            dy = sf * px + cf * py
             bx, by = _field_change(field, changes[n, a], x, y, parts)
             bx += b[2] * dx + b[3] * dy
             by += b[3] * dx + b[4] * dy
+            if at_tip and m != 0.0 and along != 0.0:
+                D[n, SWING, a] = (b[0] * by - b[1] * bx) / (along * along)
+            swing = D[n, SWING, a]
             fx = m * bx + dm[n, a] * b[0]
             fy = m * by + dm[n, a] * b[1]
-            D[n, 4, a] += cf * fx + sf * fy
-            D[n, 5, a] += cf * fy - sf * fx
+            D[n, 4, a] += cf * fx + sf * fy + m * across * swing
+            if not at_tip or m == 0.0:
+                D[n, 5, a] += cf * fy - sf * fx - m * along * swing
 
 
 @njit(**PART)
-def _enter_columns(rows, cf, sf, D):  # type: ignore[no-untyped-def]
+def _moved(n, a, dx, dy, x, y, cf, sf, D):  # type: ignore[no-untyped-def]
+    """Return what column (n, a) does to a point (x, y), in the frame as it stands.
+
+    The columns are in a frame that swings with the load at the tip, as those of x_L
+    and y_L are in `planar.march`, which says why; `dx` and `dy` are theirs.
+    """
+    dx -= D[n, SWING, a] * y
+    dy += D[n, SWING, a] * x
+    if n == 0 and a == 1:
+        dx += cf
+        dy -= sf
+    elif n == 0 and a == 2:
+        dx += sf
+        dy += cf
+    return dx, dy
+
+
+@njit(**PART)
+def _enter_columns(rows, cf, sf, X, D):  # type: ignore[no-untyped-def]
     """Set the changes of what acts within a section, whose rod rows are `rows`."""
     for n in range(D.shape[0]):
         for a in range(4):
             wx = rows[n, a, WX]
             wy = rows[n, a, WY]
             D[n, 6, a] = rows[n, a, E]
-            D[n, 7, a] = cf * wx + sf * wy
-            D[n, 8, a] = cf * wy - sf * wx
+            D[n, 7, a] = cf * wx + sf * wy + D[n, SWING, a] * X[8]
+            D[n, 8, a] = cf * wy - sf * wx - D[n, SWING, a] * X[7]
 
 
 @njit(**PART)
@@ -110,18 +122,21 @@ def _integrate(h, order, C):  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
-def _station_columns(r, h, order, before, grow, T, C, out):  # type: ignore[no-untyped-def]
+def _station_columns(r, h, order, before, grow, cf, sf, X, T, C, D, out):  # type: ignore[no-untyped-def]
     """Evaluate the columns at the fraction `r` of a step of length `h`.
 
-    `before` holds their positions where the step begins, and the products in C are
-    integrated (`_integrate`). `grow` holds how far the station slides along the
-    section, as its distance from the clamp is kept while lengths change.
+    `before` holds their positions where the step begins, as X that of the rod, and the
+    products in C are integrated (`_integrate`). `grow` holds how far the station slides
+    along the section, as its distance from the clamp is kept while lengths change.
     """
-    slope = sine = cosine = 0.0
+    slope = sine = cosine = x0 = y0 = 0.0
     for k in range(order - 1, -1, -1):
         slope = slope * r + (k + 1) * T[0, k + 1]
         sine = sine * r + T[2, k]
         cosine = cosine * r + T[3, k]
+        x0 = x0 * r + T[3, k] * h / (k + 1)
+        y0 = y0 * r + T[2, k] * h / (k + 1)
+    x0, y0 = X[2] - r * x0, X[3] - r * y0
     for n in range(C.shape[0]):
         for a in range(4):
             theta = C[n, order, 0, a]
@@ -130,10 +145,12 @@ def _station_columns(r, h, order, before, grow, T, C, out):  # type: ignore[no-u
                 theta = theta * r + C[n, k, 0, a]
                 x = x * r + C[n, k, 3, a]
                 y = y * r + C[n, k, 2, a]
+            x, y = before[n, 0, a] - r * x, before[n, 1, a] - r * y
+            x, y = _moved(n, a, x, y, x0, y0, cf, sf, D)
             c = 4 * n + a
-            out[0, c] = theta + grow[n, a] * slope / h
-            out[1, c] = before[n, 0, a] - r * x - grow[n, a] * cosine
-            out[2, c] = before[n, 1, a] - r * y - grow[n, a] * sine
+            out[0, c] = theta + D[n, SWING, a] + grow[n, a] * slope / h
+            out[1, c] = x - grow[n, a] * cosine
+            out[2, c] = y - grow[n, a] * sine
 
 
 @njit(**PART)
@@ -206,15 +223,11 @@ def parameter_columns(rod, field, u, rods, changes, clamps, s, order, step, out)
         add_load(rod, field, i, 1.0, u, 0, X, D[0])
         cf = math.cos(u[3])
         sf = math.sin(u[3])
-        if i == 0:
-            D[0, 2, 1] = D[0, 3, 2] = cf
-            D[0, 3, 1] = -sf
-            D[0, 2, 2] = sf
         x = u[1] + cf * X[2] - sf * X[3]
         y = u[2] + sf * X[2] + cf * X[3]
-        _load_columns(field, m, dm, changes, x, y, cf, sf, D)
+        _load_columns(field, m, dm, changes, i == 0, x, y, cf, sf, X, D)
         enter_section(rod, i, 1.0, u, 0, X, D[0])
-        _enter_columns(rods[i], cf, sf, D)
+        _enter_columns(rods[i], cf, sf, X, D)
         count = substeps(rod[i, H], X, step)
         h = rod[i, H] / count
         for j in range(count):
@@ -228,7 +241,7 @@ def parameter_columns(rod, field, u, rods, changes, clamps, s, order, step, out)
             last = i + 1 == rod.shape[0] and j + 1 == count
             while k >= 0 and (last or 1.0 - s[k] <= reached + h + 1e-13):
                 r = (1.0 - s[k] - reached) / h
-                _station_columns(r, h, order, before, grow, T, C, out[k])
+                _station_columns(r, h, order, before, grow, cf, sf, X, T, C, D, out[k])
                 k -= 1
             advance(h, order, X, T)
             reached += h
@@ -236,4 +249,10 @@ def parameter_columns(rod, field, u, rods, changes, clamps, s, order, step, out)
         for n in range(blocks):
             for a in range(4):
                 grow[n, a] -= rods[i, n, a, H]
+    for n in range(blocks):
+        for a in range(4):
+            D[n, 2, a], D[n, 3, a] = _moved(
+                n, a, D[n, 2, a], D[n, 3, a], X[2], X[3], cf, sf, D
+            )
+            D[n, 0, a] += D[n, SWING, a]
     return _combine(D, clamps, cf, sf, out)

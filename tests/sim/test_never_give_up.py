@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from magbend.sim import (
     MagnetField,
     Rod,
     Section,
+    sensitivities,
     solve,
     solve_many,
     solve_spatial,
@@ -70,3 +73,28 @@ def test_no_random_rod_is_given_up(times: float) -> None:
         found = solve_many(designs(200, times), magnet=source)
         assert not np.any(found["outcome"] == OUTCOMES.index("not solved"))
         assert not np.any(found["outcome"] == OUTCOMES.index("unstable"))
+
+
+def test_a_rod_drawn_into_a_strong_coil_is_followed_all_the_way() -> None:
+    # At the end its tip is in 70 boundary layers' length from the clamp: the angle of
+    # the tip from its load is 1e-31.
+    rod = Rod(
+        name="strong", side_mm=1.2, remanence_mT=-405.0,
+        sections=(
+            Section(length_mm=20.0, E_MPa=5.0), Section(length_mm=37.0, E_MPa=3.5),
+        ),
+    )  # fmt: skip
+    field = Field(Coil(diameter_mm=80.0, current_A=100.0, turns=500, gap_mm=55.0))
+    found = solve(rod, field)
+    assert found.status == "stable"
+    assert found.error_mm < 1e-7
+    assert verify(rod, field, found, degree=40) < 1e-9
+    slope = sensitivities(rod, field, parameters=["E_MPa[0]"]).dy_mm[:, 0]
+    up, down = (
+        solve(
+            replace(rod, sections=(replace(rod.sections[0], E_MPa=E), rod.sections[1])),
+            field,
+        ).centreline.y_mm
+        for E in (5.0001, 4.9999)
+    )
+    np.testing.assert_allclose(slope, (up - down) / 2e-4, atol=1e-6)
