@@ -197,7 +197,9 @@ def clamp_tag(
 
     target = out or calibration
     output_file(target)
-    known = {"rod_height_mm": rod_height_mm, "clamp_height_mm": clamp_height_mm}
+    known: dict[str, float | None] = {
+        "rod_height_mm": rod_height_mm, "clamp_height_mm": clamp_height_mm,
+    }  # fmt: skip
     setting = setting_of(calibration, None, known)
     if (rod := specimen_of(specimen, None)) is not None:
         setting = with_specimen(setting, rod)

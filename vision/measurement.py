@@ -71,6 +71,26 @@ class Pose:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Motion:
+    """A rod in a film: where its points are and how fast they go, by a filter.
+
+    Parameters
+    ----------
+    state_px : ndarray, shape (3, n, 2)
+        Points of the axis, clamp to tip, their velocity and acceleration, px, px per
+        frame and per frame squared.
+    covariance : ndarray, shape (3, 3)
+        Of the three, of the point that moves most.
+    push_px : float
+        Standard deviation of the change of an acceleration from frame to frame.
+    """
+
+    state_px: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    push_px: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Measurement:
     """The result of one photograph.
 
@@ -107,6 +127,8 @@ class Measurement:
         Weights of blue, green and red in whose light it was measured; None is grey.
     seen_px : tuple of ndarray, shape (n, 2)
         Of a failed one: axes of the things that might have been the rod.
+    motion : Motion or None
+        Of a frame of a film: how the rod moves (`extraction.motion`).
     """
 
     status: Literal["ok", "failed"]
@@ -130,6 +152,7 @@ class Measurement:
     inverted: bool = False
     mix: tuple[float, float, float] | None = None
     seen_px: tuple[NDArray[np.float64], ...] = ()
+    motion: Motion | None = field(default=None, repr=False, compare=False)
 
     @property
     def ok(self) -> bool:

@@ -321,12 +321,15 @@ def test_video_frames_are_numbered_and_measured(tmp_path):
     for angle in angles:
         image = frame(angle=angle, clamp_px=(200.0, 520.0), angle_deg=0.0).image
         video.write(cv2.cvtColor(image, cv2.COLOR_GRAY2BGR))
+    video.write(np.full((*SIZE[::-1], 3), 230, np.uint8))
     video.release()
     result = extract_files([path], tmp_path / "out", setting=SETTINGS)
-    assert [row.image for row in result.frames] == [f"bend_{i:06d}" for i in range(3)]
-    found = [row.tip_angle_deg for row in result.frames]
+    assert [row.image for row in result.frames] == [f"bend_{i:06d}" for i in range(4)]
+    found = [row.tip_angle_deg for row in result.frames if row.ok]
     np.testing.assert_allclose(found, angles, atol=1.0)
-    assert (tmp_path / "out" / "overlays" / "bend_000002.png").exists()
+    # Of a film every tenth frame is drawn, and what was refused.
+    drawn = sorted(path.name for path in (tmp_path / "out" / "overlays").iterdir())
+    assert drawn == ["bend_000000.png", "bend_000003.png"]
 
 
 def test_file_that_is_no_video_is_refused(tmp_path):

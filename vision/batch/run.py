@@ -27,7 +27,7 @@ from ..extraction.follow import follow
 from ..extraction.setting import Setting
 from ..measurement import Measurement, failure
 from .cold import while_cold
-from .inputs import Source, digest, list_sources, read_source
+from .inputs import VIDEOS, Source, digest, list_sources, read_source
 from .overlay import overlay_png
 from .state import STATE_FILE, State
 from .tables import Done, FrameRow, done_with
@@ -35,6 +35,9 @@ from .tables import Done, FrameRow, done_with
 _log = logging.getLogger(__name__)
 
 _CHUNK = 8
+_EVERY = 10
+"""Of a film every so many frames are drawn, and those that were refused: to draw and
+store one takes longer than to measure it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -199,13 +202,23 @@ class _Task:
         except OSError as error:
             reason = error.strerror or str(error)
             measurement = failure("unreadable", f"cannot be read: {reason}")
-        if self.overlays is not None and photo is not None:
+        if (
+            self.overlays is not None
+            and photo is not None
+            and _drawn(source, measurement)
+        ):
             write_bytes(self.overlays / source.overlay, overlay_png(photo, measurement))
         done = done_with(
             source.image, sha256, measurement, self.setting.calibration,
             edges=self.edges,
         )  # fmt: skip
         return done, measurement
+
+
+def _drawn(source: Source, measurement: Measurement) -> bool:
+    """Whether to draw an overlay: of a film not of every frame that was measured."""
+    film = source.path.suffix.lower() in VIDEOS
+    return not film or not measurement.ok or (source.frame or 0) % _EVERY == 0
 
 
 _task: _Task | None = None

@@ -157,20 +157,24 @@ def edge_points(found: Measurement, calibration: Calibration | None) -> Array:
 
 def write_frames(rows: Iterable[FrameRow]) -> str:
     """Return the text of a ``frames.csv``."""
-    return _table(FRAME_HEADER, (_frame_cells(row) for row in rows))
+    return _table([FRAME_HEADER, *(_frame_cells(row) for row in rows)])
 
 
 def write_centrelines(done: Iterable[Done]) -> str:
     """Return the text of a ``centrelines.csv``."""
-    lines = (
-        [each.row.image, *map(_cell, values)]
-        for each in done
-        if each.points
-        for values in zip(
-            *(each.points[name] for name in CENTRELINE_COLUMNS), strict=True
-        )
-    )
-    return _table(CENTRELINE_HEADER, lines)
+    points = (_points_text(each) for each in done if each.points)
+    return _table([CENTRELINE_HEADER]) + "".join(points)
+
+
+def _points_text(done: Done) -> str:
+    """Return the rows of one photograph; of a film, that is most of the tables."""
+    values = np.column_stack([done.points[name] for name in CENTRELINE_COLUMNS])
+    image = done.row.image
+    if not np.all(np.isfinite(values)):
+        return _table([image, *map(_cell, row)] for row in values.tolist())
+    name = _table([(image,)]).rstrip("\n").replace("%", "%%")
+    row = name + ",%.10g" * len(CENTRELINE_COLUMNS) + "\n"
+    return (row * len(values)) % tuple(values.ravel().tolist())
 
 
 def write_edges(done: Iterable[Done]) -> str:
@@ -180,7 +184,7 @@ def write_edges(done: Iterable[Done]) -> str:
         for each in done
         for values in each.edges
     )
-    return _table(EDGE_HEADER, lines)
+    return _table([EDGE_HEADER, *lines])
 
 
 def read_frames(path: Path) -> list[FrameRow]:
@@ -311,11 +315,9 @@ def _cell(value: float) -> str:
     return f"{value:.10g}" if math.isfinite(value) else ""
 
 
-def _table(header: Iterable[str], lines: Iterable[Sequence[str]]) -> str:
+def _table(lines: Iterable[Sequence[str]]) -> str:
     buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows(lines)
+    csv.writer(buffer, lineterminator="\n").writerows(lines)
     return buffer.getvalue()
 
 

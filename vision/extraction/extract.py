@@ -171,7 +171,7 @@ def measure_candidate(
 
 def finish(
     photo: Photo, view: View, start: Start, candidate: Candidate, setting: Setting, *,
-    near: bool = False,
+    sd_px: float = np.inf,
 ) -> Measurement:  # fmt: skip
     """Refine, judge and turn into mm what starts from a curve near the axis.
 
@@ -183,8 +183,8 @@ def finish(
         The curve, and what was found before it.
     setting : Setting
         What is known.
-    near : bool
-        Whether the rod need not be sought any more; see `refine`.
+    sd_px : float
+        How surely the start tells the rod and its ends; see `refine`.
 
     Raises
     ------
@@ -196,9 +196,9 @@ def finish(
         view.grey, start, root=candidate.root, sign=view.sign,
         joints=setting.joints_px,
         walls=setting.walls_px if calibrated and view.sign > 0.0 else None,
-        face_px=setting.face_px(start.curve), near=near,
+        face_px=setting.face_px(start.curve), sd_px=sd_px,
     )  # fmt: skip
-    if near and not refined.settled:
+    if np.isfinite(sd_px) and not refined.settled:
         raise LostError("edges_lost", "the rod moved too far since the last frame")
     refusal(view, refined, candidate)
     result = measurement(refined, view, setting, _told(photo, setting))

@@ -1,17 +1,21 @@
 """One frame after the other: the last measurement tells where to look for the next.
 
-A camera that watches a bench takes the rod's next picture before it has gone far. So
-its edges are sought about the last axis, without a look at the rest of the picture;
-where they are not found there, or do not make the same rod, the whole picture is
-searched as if it were the first.
+A camera that watches a bench takes the rod's next picture before it has gone far. A
+filter (`motion`) expects it somewhere and knows how surely; its edges are sought there,
+without a look at the rest of the picture. Where they are not found, do not make the
+same rod, or lie too far off for what was expected, the whole picture is searched as if
+it were the first.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from ...core.errors import MagbendError
 from ..camera.oriented import oriented
+from ..curve.curve import Curve
 from ..edge.state import LostError, Root
 from ..find.ground import View, mixed
 from ..find.rod import Candidate
@@ -20,10 +24,13 @@ from ..measurement import Measurement
 from ..picture.photo import Photo
 from .bare import flattened
 from .extract import BROKEN, finish, measure
-from .setting import Setting
+from .motion import begun, expected, moved_on
+from .setting import Setting, arc_mm
 
 REACHES = 1.0, 3.0
-"""How far from the last axis the rod is sought, in its widths: first near, then far."""
+"""How far from where it is expected the rod is sought, in its widths."""
+CLOSE = 0.11
+"""Standard deviation of where it is expected, in its widths, that edges bear."""
 
 SAME_LENGTH, SAME_WIDTH = 0.04, 0.15
 """By what part a rod may be longer or wider than in the last frame, at most."""
@@ -67,19 +74,23 @@ def follow(
     24
     """
     if last is not None and last.ok:
+        last = last if last.motion is not None else begun(last)
         try:
             found = _near(photo, setting, last)
         except (LostError, MagbendError):
             found = None  # of another size; a full search says so
         if found is not None:
             return found
-    return measure(photo, setting)
+    return begun(measure(photo, setting))
 
 
 def _near(photo: Photo, setting: Setting, last: Measurement) -> Measurement | None:
-    """Return the same rod as found about the last axis; None where it is not."""
+    """Return the same rod as found where it is expected; None where it is not."""
+    if last.motion is None:
+        return None
+    points, sd = expected(last.motion)
     rod = Candidate(
-        points_px=last.points_px, width_px=last.width_px, length_px=last.length_px,
+        points_px=points, width_px=last.width_px, length_px=last.length_px,
         root=_root(last), contacts=1, ratio=0.0,
     )  # fmt: skip
     if setting.calibration is not None:
@@ -88,17 +99,31 @@ def _near(photo: Photo, setting: Setting, last: Measurement) -> Measurement | No
     if setting.bare is not None:
         photo = flattened(photo, setting.bare, setting.guide_px)
     view = mixed(photo, last.mix, -1.0 if last.inverted else 1.0)
-    for reach in REACHES:
+    close = sd < CLOSE * last.width_px and "rough_edges" not in last.flags
+    for reach in (0.0, *REACHES) if close else REACHES:
         try:
-            start = _start(view, rod, reach)
+            start = _start(view, rod, reach) if reach else _expected(rod)
             if start is None:
                 continue
-            found = finish(photo, view, start, rod, setting, near=True)
+            found = finish(photo, view, start, rod, setting, sd_px=reach or sd)
         except (LostError, *BROKEN):
             continue
         if found.ok and _same(found.length_px, found.width_px, last):
-            return found
+            moved = moved_on(last.motion, found)
+            if moved is not None:
+                return moved
     return None
+
+
+def _expected(rod: Candidate) -> Start:
+    """Return a start right where the rod is expected."""
+    s = arc_mm(rod.points_px)
+    even = np.linspace(0.0, s[-1], len(s))
+    points = np.column_stack([np.interp(even, s, axis) for axis in rod.points_px.T])
+    step = np.gradient(points, axis=0)
+    theta = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
+    line = Curve(s=even, points=points, theta=theta, kappa=np.gradient(theta, even[1]))
+    return Start(curve=line, width=rod.width_px, rough=False, blur=1.0)
 
 
 def _start(view: View, rod: Candidate, reach: float) -> Start | None:

@@ -31,6 +31,8 @@ _PASSES = 5
 _SEEKING_PASSES, _NEAR_PX = 2, 0.4
 """At most so many passes only seek the rod, on every other station and with a supple
 curve; one that moves it by less is the last of them."""
+_SURE_PX = 0.25
+"""A start that is so sure need not be sought."""
 _STILL_PX, _ENDS_STILL_PX = 0.02, 0.15
 """By how much the curve and its ends may move when all is found; the ends are those of
 the curve as it is then."""
@@ -100,7 +102,7 @@ def refine(
     joints: Callable[[Curve], Sequence[float]] = lambda _curve: (),
     walls: Walls | None = None,
     face_px: float = 0.0,
-    near: bool = False,
+    sd_px: float = np.inf,
 ) -> Refined:
     """Measure axis, edges and ends.
 
@@ -122,8 +124,8 @@ def refine(
         seen on the left.
     face_px : float
         How much of a clamp's face the camera may see, along the rod.
-    near : bool
-        Whether the start may be so near that no pass need only seek the rod.
+    sd_px : float
+        Standard deviation of the start where it tells the ends too, as in a film.
 
     Raises
     ------
@@ -135,22 +137,21 @@ def refine(
     state = State(
         start.curve, half, start.width, 0.0, last, face_px, start.rough, start.blur
     )
-    seen = _look(grey, state, sign, 0, seeking=not near)
-    if near and np.quantile(np.abs(seen.edges.middle[seen.good]), 0.95) > _NEAR_PX:
-        near = False
-        seen = _look(grey, state, sign, 0, seeking=True)
-    seeking, before = not near, int(near)
-    still_px = _NEAR_STILL_PX if near else _STILL_PX
-    tip, lines, first = find_ends(grey, state, seen, root, sign, 0, walls)
+    seeking = sd_px > _SURE_PX
+    seen = _look(grey, state, sign, 0, seeking=seeking)
+    first, end, still_px = 0.0, last, _NEAR_STILL_PX
+    if not np.isfinite(sd_px):
+        tip, lines, first = find_ends(grey, state, seen, root, sign, 0, walls)
+        end, still_px = tip.s, _STILL_PX
     places, aside, settled = None, np.inf, False
-    for turn in range(before, _PASSES):
-        if turn > before:
+    for turn in range(_PASSES):
+        if turn:
             seen = _look(grey, state, sign, turn, seeking=seeking)
         if walls is not None:
             seen = to_wall_ends(state, seen, walls)
         known = None if places is None or aside > _JOINTS_STILL_PX else places - first
         fit, used, aside, places = _fit(
-            state, seen, first, tip.s, joints, known, seeking=seeking,
+            state, seen, first, end, joints, known, seeking=seeking,
             clamped=root == "clamp",
         )  # fmt: skip
         at = fit.curve.s + first
@@ -159,8 +160,10 @@ def refine(
         state.curve, state.half = fit.curve, 0.5 * width
         state.first, state.last = 0.0, float(fit.curve.s[-1])
         # The ends of the curve as it is now: often they move when it does not.
-        tip, lines, first = find_ends(grey, state, seen, root, sign, turn + 1, walls)
-        moved = abs(first) + abs(tip.s - state.last)
+        later = turn + 1 if seeking else turn + 2
+        tip, lines, first = find_ends(grey, state, seen, root, sign, later, walls)
+        end = tip.s
+        moved = abs(first) + abs(end - state.last)
         still = aside < still_px and moved < _ENDS_STILL_PX
         settled = still and not seeking
         if settled:
