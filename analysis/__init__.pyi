@@ -226,6 +226,21 @@ from .recipe.rods import (
 from .report.build import (
     write_report as write_report,
 )
+from .ring import (
+    AGREE as AGREE,
+)
+from .ring import (
+    Factor as Factor,
+)
+from .ring import (
+    apart as apart,
+)
+from .ring import (
+    fit_factor as fit_factor,
+)
+from .ring import (
+    ring_factor as ring_factor,
+)
 from .runs.data import (
     RunData as RunData,
 )

@@ -8,6 +8,7 @@ from . import (
     analysis_lumen,
     analysis_model,
     analysis_out,
+    analysis_ring,
     analysis_runs,
     recipe,
 )
@@ -21,6 +22,7 @@ app = group(
 
 analysis_runs.register(app)
 analysis_fit.register(app)
+analysis_ring.register(app)
 analysis_import.register(app)
 app.command("lumen", epilog=analysis_lumen.EXAMPLE)(analysis_lumen.lumen)
 analysis_model.register(app)

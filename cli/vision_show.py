@@ -156,7 +156,8 @@ def tell_ringing(found: Ringing, settle_mm: float) -> None:
         f"damping ratio {found.damping_ratio:.4f} +- {found.damping_ratio_sd:.4f}"
     )
     settled = (
-        f"below {settle_mm:g} mm {found.settle_s:.2f} s later"
+        f"below {settle_mm:g} mm {found.settle_s:.2f} +- {found.settle_sd_s:.2f} s "
+        "later"
         if math.isfinite(found.settle_s)
         else "it does not die away"
     )

@@ -199,3 +199,9 @@ from .study.sweep import (
 from .table1 import (
     gmc as gmc,
 )
+from .vibration import (
+    Mode as Mode,
+)
+from .vibration import (
+    first_mode as first_mode,
+)

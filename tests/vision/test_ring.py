@@ -39,6 +39,8 @@ def test_a_vibration_is_found_within_its_deviations(frequency, ratio):
     decay = ratio * 2.0 * np.pi * frequency / np.sqrt(1.0 - ratio**2)
     settle = np.log(found.amplitude_mm / 0.1) / decay
     assert found.settle_s == pytest.approx(settle, rel=0.1)
+    assert abs(found.settle_s - settle) < 4.0 * found.settle_sd_s
+    assert found.settle_sd_s < 0.1 * settle
 
 
 def test_frames_that_were_not_measured_are_left_out():

@@ -39,7 +39,7 @@ class Ringing:
         Decay rate over the angular frequency without damping.
     amplitude_mm : float
         At the first frame that was used.
-    settle_s : float
+    settle_s, settle_sd_s : float
         From there until the amplitude is below what counts as settled; infinite for a
         vibration that does not die away.
     rest_mm : float
@@ -58,6 +58,7 @@ class Ringing:
     damping_ratio_sd: float
     amplitude_mm: float
     settle_s: float
+    settle_sd_s: float
     rest_mm: float
     residual_mm: float
     first_s: float
@@ -119,13 +120,16 @@ def ring_down(time_s: Array, tip_mm: Array, *, settle_mm: float = 0.05) -> Ringi
     covariance = sd**2 * np.linalg.pinv(jacobian.T @ jacobian)
     omega_sd, decay_sd = np.sqrt(np.diag(covariance))
     settled = math.log(max(amplitude / settle_mm, 1.0))
+    settle_s = settle_sd_s = math.inf
+    if decay > 0.0:
+        settle_s, settle_sd_s = settled / decay, settled * float(decay_sd) / decay**2
     return Ringing(
         frequency_Hz=omega / (2.0 * math.pi),
         frequency_sd_Hz=float(omega_sd) / (2.0 * math.pi),
         damping_ratio=decay / math.hypot(omega, decay),
         damping_ratio_sd=float(decay_sd) / math.hypot(omega, decay),
         amplitude_mm=amplitude,
-        settle_s=settled / decay if decay > 0.0 else math.inf,
+        settle_s=settle_s, settle_sd_s=settle_sd_s,
         rest_mm=float(rest), residual_mm=sd, first_s=start, frames=len(t),
     )  # fmt: skip
 
