@@ -192,8 +192,20 @@ def read_lumen(path: Path) -> Lumen | Tube:
 
 
 def lumen_of(text: str) -> Lumen:
-    """Return the lumen of the text of a lumen file that was read before."""
-    return LumenModel.model_validate(tomllib.loads(text)).lumen()
+    """Return the planar lumen of the text of a lumen file that was read before.
+
+    Raises
+    ------
+    InputError
+        If it is a tube in space.
+    """
+    lumen = LumenModel.model_validate(tomllib.loads(text)).lumen()
+    if isinstance(lumen, Tube):
+        raise InputError(
+            "a lumen under the camera must be planar, of [[wall]]s or a [channel]; "
+            f"instead received tube {lumen.name!r}"
+        )
+    return lumen
 
 
 def read_poses(path: Path) -> list[dict[str, Any]]:

@@ -18,12 +18,12 @@ from ..spatial.march import MU1, MU2
 from ..spatial.rod import SpatialRod, rod_table
 from ..tube.mesh import clamp, interpolated, mesh, root_strain, straight, trace
 from ..tube.rod import Rod
-from ..tube.settle import SETTLED, Rest, Scene, settle
+from ..tube.settle import SETTLED, SOFT, Rest, Scene, settle
 from ..tube.touch import TIP, Touches
 from ..tube.tube import Tube
 from ..tube.wall import Bore, gaps
 from .passage import Contact, Passage, Step
-from .walk import SOFT, Walk
+from .walk import Walk
 
 Array = NDArray[np.float64]
 

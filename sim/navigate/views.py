@@ -57,10 +57,9 @@ def tube_in_space(axes: Any, tube: Tube, passage: Passage) -> None:
     """Draw the tube as a shade, and the rod on its way and where it presses."""
     low, high = _frame(tube, passage)
     wall = _wall(tube)
-    beyond = (wall < low[:, None, None]).any(axis=0) | (wall > high[:, None, None]).any(
-        axis=0
-    )
-    wall = np.where(beyond.all(axis=1)[None, :, None], np.nan, wall)
+    box = low[:, None, None], high[:, None, None]
+    beyond = np.any((wall < box[0]) | (wall > box[1]), axis=0).all(axis=1)
+    wall[:, beyond] = np.nan
     axes.plot_surface(*wall, color="0.6", alpha=0.18, lw=0, rcount=121, ccount=AROUND)
     shown = passage.steps[:: max(1, len(passage.steps) // 6)]
     for k, step in enumerate(shown):
@@ -116,7 +115,7 @@ def rod_in_views(views: Sequence[Axes], step: Step, side_mm: float) -> list[Any]
             spots = np.array([[c.x_mm, c.y_mm, c.z_mm] for c in step.contacts])  # type: ignore[attr-defined]
             drawn.append(
                 axes.scatter(
-                    *spots.T[[i, j]], s=_sizes(step), color="C3", zorder=3, lw=0
+                    spots[:, i], spots[:, j], s=_sizes(step), color="C3", zorder=3, lw=0
                 )
             )
     return drawn

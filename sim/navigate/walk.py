@@ -58,7 +58,10 @@ class AtRest(Protocol):
 class OfCase(Protocol):
     """What a walk asks of its case; see `case.Case`."""
 
-    tip: tuple[float, float, float] | None
+    @property
+    def tip(self) -> tuple[float, float, float] | None:
+        """Where the tip is held."""
+        ...
 
     @property
     def length_mm(self) -> float:

@@ -36,10 +36,13 @@ _X, _W = np.polynomial.legendre.leggauss(GAUSS)
 POINTS: Array = 0.5 * (_X + 1.0)
 WEIGHTS: Array = 0.5 * _W
 _POWERS = np.arange(GAUSS)
-UP_TO: Array = np.linalg.solve(
-    np.vander(POINTS, increasing=True).T,
-    (POINTS[:, None] ** (_POWERS + 1) / (_POWERS + 1)).T,
-).T.copy()
+UP_TO: Array = np.ascontiguousarray(
+    np.linalg.solve(
+        np.vander(POINTS, increasing=True).T,
+        (POINTS[:, None] ** (_POWERS + 1) / (_POWERS + 1)).T,
+    ).T,
+    dtype=np.float64,
+)
 """Integral from 0 to each point, by the values at all points, shape (5, 5)."""
 STEP = 9
 """Unknowns of an element that the next does not share."""

@@ -23,6 +23,7 @@ from .touch import FLAT, FLOATS, Seen, Touches, exchange, seen_of, sort_kinds, s
 from .wall import Bore
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 SETTLED, RESTLESS, JAMMED, PULLED = range(4)
 """Outcomes: at rest; no convergence; no room left; pulled onto a magnet."""
@@ -179,12 +180,12 @@ def _strayed(touches: Touches, seen: Seen) -> int:
     return int(np.sum(floats & _held(touches)))
 
 
-def _held(touches: Touches) -> Array:
+def _held(touches: Touches) -> NDArray[np.bool_]:
     """Tell which contacts are as far from home as they may be."""
     return np.asarray(abs(touches.s - touches.home) > 0.999 * touches.room)
 
 
-def _points(scene: Scene, look: _Look) -> tuple[Array, Array, Array]:
+def _points(scene: Scene, look: _Look) -> tuple[Ints, Array, Array]:
     """Return node, pull and its derivative of each pole."""
     rod = scene.rod
     at = np.flatnonzero(rod.pole)
@@ -243,7 +244,7 @@ def _slopes(
 
 def _softest(L: Array, size: int) -> Array:
     """Return the softest way out of a saddle, of size 1e-3 rad."""
-    d = np.sin(1.7 * np.arange(size)) + 0.3
+    d: Array = np.sin(1.7 * np.arange(size)) + 0.3
     for _ in range(8):
         solve(L, d)
         d *= 1e-3 / np.max(np.abs(d))

@@ -77,7 +77,7 @@ class Touches:
     home: Array = field(default_factory=_nothing)
     room: Array = field(default_factory=_nothing)
 
-    def kept(self, which: Array) -> Touches:
+    def kept(self, which: NDArray[np.bool_]) -> Touches:
         """Return some of them."""
         return Touches(*(getattr(self, name)[which] for name in self.__slots__))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -224,7 +225,7 @@ def _bore_of(points: Array, radii: Array, direction: Point | None) -> Bore:
     chords = np.linalg.norm(np.diff(points, axis=0), axis=1)
     knots = np.concatenate([[0.0], np.cumsum(chords)])
     level = np.zeros(3)
-    first = (2, level) if direction is None else (1, np.array(direction))
+    first: Any = (2, level) if direction is None else (1, np.array(direction))
     given = CubicSpline(knots, points, bc_type=(first, (2, level)))
     # Places along it, by Simpson's rule on 64 pieces of each chord.
     fine = np.unique(
