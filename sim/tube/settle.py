@@ -19,7 +19,16 @@ from ..magnet.flux import UNIFORM, flux_at
 from .linear import FIRST, add_dyads, add_points, factor, solve
 from .rod import STEP, Rod, Turn, own_energy, turned, within_magnet
 from .slopes import assemble, places, press
-from .touch import FLAT, FLOATS, Seen, Touches, exchange, seen_of, sort_kinds, survey
+from .touch import (
+    FLAT,
+    FLOATS,
+    Seen,
+    Touches,
+    exchange,
+    seen_of,
+    sort_kinds,
+    survey,
+)
 from .wall import Bore
 
 Array = NDArray[np.float64]
@@ -27,6 +36,9 @@ Ints = NDArray[np.int64]
 
 SETTLED, RESTLESS, JAMMED, PULLED = range(4)
 """Outcomes: at rest; no convergence; no room left; pulled onto a magnet."""
+RESTED, STUCK, BLIND = range(3)
+"""Ends of Newton's steps: at rest; no way down, as where a contact that floats comes to
+a joint, on whose sides the rod bends differently; behind a wall without a contact."""
 SOFT, HARD = 1e6, 1e8
 """Stiffness of the walls at first and at last: it decides how fast the gaps close, not
 how far."""
@@ -45,6 +57,9 @@ LONGEST = 0.4
 SMALL, CALM = 1e-11, 1e-7
 """Newton's steps after which it is at rest, and below which the energy tells nothing.
 """
+PAIR = 0.03
+"""Where Newton is stuck two contacts, so far on either side, stay for one that floats,
+in elements."""
 WILD = 1e-3
 """Steps beyond this are looked at: they must not pass a wall."""
 BOLD = 1e-4
@@ -125,14 +140,15 @@ def settle(scene: Scene, turn: Turn, touches: Touches, soft: float) -> Rest:
     soft : float
         Stiffness of the walls to begin with.
     """
-    stiff, failed, before, deepest = soft, 0, 1e9, 0.0
+    stiff, stuck, before, deepest = soft, 0, 1e9, 0.0
     outcome = RESTLESS
+    h = scene.rod.s[-1] / len(scene.rod.m)
     look = _Look(scene, turn, touches, stiff)
     exchange(scene.rod, turn, look.X, scene.tube, scene.half, touches, scene.start)
     for k in range(ROUNDS):
         seen = seen_of(scene.rod, turn, look.X, scene.tube, scene.half, touches)
-        sort_kinds(scene.rod, seen, touches, free=k < PATIENCE)
-        rested, stable, look = _newton(scene, turn, touches, stiff)
+        sort_kinds(scene.rod, seen, touches, free=k < PATIENCE, float_too=not stuck)
+        end, stable, look = _newton(scene, turn, touches, stiff)
         turn = look.turn
         if not is_uniform_field(scene.field) and within_magnet(scene.field, look.X):
             outcome = PULLED
@@ -140,7 +156,7 @@ def settle(scene: Scene, turn: Turn, touches: Touches, soft: float) -> Rest:
         worst = float(np.max(abs(look.force - touches.force), initial=0.0)) / stiff
         touches.force = look.force
         changed = 0
-        if worst < 1e-3 or not rested:
+        if worst < 1e-3 or end != RESTED:
             changed = _strayed(touches, look.seen)
             if k < PATIENCE:
                 kept = (touches.force > 0.0) | (look.seen.gap < GAP)
@@ -149,13 +165,15 @@ def settle(scene: Scene, turn: Turn, touches: Touches, soft: float) -> Rest:
                 scene.rod, turn, look.X, scene.tube, scene.half, touches, scene.start
             )
             changed = changed + added if k < FROZEN else 0
-        if rested and not changed and worst < (GAP if k < FROZEN else LOOSE):
+        if end == RESTED and not changed and worst < (GAP if k < FROZEN else LOOSE):
             outcome = SETTLED if deepest < TOO_DEEP else JAMMED
             break
-        failed += not rested
+        if end == STUCK:
+            stuck += 1
+            touches = touches.paired(PAIR * h)
         if k > 8 and worst > 1e-4:
             outcome = JAMMED
-        if soft >= SOFT and (failed > 6 or (outcome == JAMMED and k > 14)):
+        if soft >= SOFT and (stuck > 6 or (outcome == JAMMED and k > 14)):
             break
         if worst > 0.1 * before:
             stiff = min(HARD, 10.0 * stiff)
@@ -253,8 +271,8 @@ def _softest(L: Array, size: int) -> Array:
 
 def _newton(
     scene: Scene, turn: Turn, touches: Touches, stiff: float
-) -> tuple[bool, bool, _Look]:
-    """Minimise the augmented energy; return whether it rests, is stable, and how."""
+) -> tuple[int, bool, _Look]:
+    """Minimise the augmented energy; return how it ended, whether stable, the rod."""
     look = _Look(scene, turn, touches, stiff)
     kicked = False
     shift = 0.0
@@ -266,22 +284,22 @@ def _newton(
         solve(L, d := -g)
         size = float(np.max(np.abs(d)))
         if not math.isfinite(size):
-            return False, False, look
+            return STUCK, False, look
         if size < SMALL and (shift == 0.0 or kicked):
-            return True, shift == 0.0, look
+            return RESTED, shift == 0.0, look
         if size < CALM and shift > 0.0 and not kicked:
             d, kicked = _softest(L, len(g)), True
             look = _Look(scene, _by(look.turn, d), touches, stiff)
             continue
         found = _down(scene, look, touches, stiff, d, g, L)
         if found is None:
-            return size < CALM, shift == 0.0, look
+            return RESTED if size < CALM else STUCK, shift == 0.0, look
         look = found
         if shift == 0.0 and size < CALM:
-            return True, True, look
+            return RESTED, True, look
         if size > WILD and _behind(scene, look) > 0.1 * scene.room:
-            break  # there are walls that it does not know of
-    return False, False, look
+            return BLIND, False, look
+    return STUCK, False, look
 
 
 def _strays(scene: Scene, old: _Look, new: _Look) -> bool:

@@ -77,7 +77,7 @@ class Touches:
     home: Array = field(default_factory=_nothing)
     room: Array = field(default_factory=_nothing)
 
-    def kept(self, which: NDArray[np.bool_]) -> Touches:
+    def kept(self, which: NDArray[np.bool_] | Ints) -> Touches:
         """Return some of them."""
         return Touches(*(getattr(self, name)[which] for name in self.__slots__))
 
@@ -87,6 +87,16 @@ class Touches:
             s, self.force.copy(), self.kind.copy(), self.p.copy(), s.copy(),
             self.room.copy(),
         )  # fmt: skip
+
+    def paired(self, apart: float) -> Touches:
+        """Return them with two that stay, so far from it, for each that floats."""
+        floats = self.kind == FLOATS
+        new = self.kept(np.repeat(np.arange(len(self.s)), np.where(floats, 2, 1)))
+        pairs = new.kind == FLOATS
+        new.s[pairs] += np.tile([-apart, apart], int(floats.sum()))
+        new.force[pairs] *= 0.5
+        new.kind[pairs] = FIXED
+        return new
 
     def add(self, s: float, kind: int, p: float) -> None:
         """Add one without force."""
@@ -216,15 +226,27 @@ def exchange(
     return added, max(0.0, -float(np.min(seen.gap, initial=0.0)))
 
 
-def sort_kinds(rod: Rod, seen: Seen, touches: Touches, *, free: bool) -> None:
-    """Let isolated contacts float, the others stay; give each its home and room."""
+def sort_kinds(
+    rod: Rod, seen: Seen, touches: Touches, *, free: bool, float_too: bool
+) -> None:
+    """Let isolated contacts float, the others stay; give each its home and room.
+
+    Parameters
+    ----------
+    free : bool
+        Whether one that stays may float again.
+    float_too : bool
+        Whether any may float.
+    """
     h = rod.s[-1] / len(rod.m)
     apart = abs(touches.s[:, None] - touches.s)
     np.fill_diagonal(apart, np.inf)
     # The tip lies apart from what is near to it along the rod.
     alone = np.min(apart, axis=1, initial=np.inf) > APART * h
     floats = alone & (seen.second > 4.0 * OVERLAP / (APART * h) ** 2)
-    if not free:
+    if not float_too:
+        floats[:] = False
+    elif not free:
         floats &= touches.kind == FLOATS
     touches.kind[touches.kind != TIP] = FIXED
     touches.kind[floats & (touches.kind != TIP)] = FLOATS
