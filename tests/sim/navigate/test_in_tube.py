@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 from scipy.optimize import minimize
 
 from magbend.core.magnet import Magnet
@@ -32,6 +33,7 @@ MAGNET = MagnetField(
     ),
     gap_mm=45.0,
 )  # fmt: skip
+DOWNWARD = Support(gravity_m_s2=(0.0, 0.0, -9.80665))
 DOWN = Support(gravity_m_s2=(1.0, 2.0, -9.80665))
 
 
@@ -182,7 +184,7 @@ def test_least_energy_of_a_chain_of_links_comes_to_the_same():
         square = ((points[:, None] - place) ** 2).sum(axis=2).min(axis=1)
         return 0.7 - np.sqrt(square)
 
-    coarse, fine = (chain(rod, 24.0, n, flux_T, wall) for n in (10, 20))
+    coarse, fine = (chain(rod, 24.0, n, flux_T, wall) for n in (8, 16))
     tip = fine[0] + (fine[0] - coarse[0]) / 3.0
     energy = fine[1] + (fine[1] - coarse[1]) / 3.0
     assert len(last.contacts) >= 2
@@ -203,3 +205,91 @@ def test_the_work_of_the_hand_is_stored(tube):
         lost.append(abs(work - stored))
     assert lost[1] < 6e-3 * abs(stored)
     assert lost[1] < 0.6 * lost[0]
+
+
+LOAD_N_T = math.pi / 4.0 * 1e-6 * 0.1 / (4e-7 * math.pi)
+"""Dead load at the tip, per tesla, of a round rod of 1 mm and 100 mT."""
+
+
+def buckling_load(length_mm: float, EI: float, spring: float, *, held: bool) -> float:
+    """Return the least dead load that buckles a clamped beam on springs, in N.
+
+    Cubic finite elements of a straight beam; its other end is free, or held in place.
+    """
+    n = 80
+    h = length_mm / n
+    bend = [[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]]
+    mass = [
+        [156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4],
+    ]  # fmt: skip
+    load = [[36, 3, -36, 3], [3, 4, -3, -1], [-36, -3, 36, -3], [3, -1, -3, 4]]
+    K, G = np.zeros((2, 2 * n + 2, 2 * n + 2))
+    for e in range(n):
+        part = slice(2 * e, 2 * e + 4)
+        K[part, part] += np.array(bend) * EI / h**3 + np.array(mass) * spring * h / 420
+        G[part, part] += np.array(load) / (30.0 * h)
+    kept = np.arange(2, 2 * n + 2)
+    kept = kept[kept != 2 * n] if held else kept
+    some = np.ix_(kept, kept)
+    return 1.0 / eigh(G[some], K[some], eigvals_only=True)[-1]
+
+
+def test_a_rod_that_lies_in_a_tube_buckles_as_a_beam_on_springs():
+    """A tube's bottom pushes a heavy rod back by w / r of its way up the wall.
+
+    A long rod held at its end buckles at 2 sqrt(EI w / r) (Dawson and Paslay 1984), one
+    with a free end at half of that.
+    """
+    length_mm, room_mm = 40.0, 1.0
+    rod = round_rod(length_mm, remanence_mT=100.0, density_kg_m3=20000.0)
+    EI = stiffness(rod)
+    weight = 20000e-9 * 9.80665 * math.pi / 4.0
+    known = 2.0 * math.sqrt(EI * weight / room_mm)
+    held = buckling_load(150.0, EI, weight / room_mm, held=True)
+    assert held == pytest.approx(known, rel=5e-3)
+    critical = buckling_load(length_mm, EI, weight / room_mm, held=False)
+    assert critical == pytest.approx(0.5 * known, rel=1e-3)
+    tube = Tube(
+        name="straight", points_mm=[(0, 0, room_mm), (60, 0, room_mm)], radius_mm=1.5,
+        entry_mm=(0, 0, 0),
+    )  # fmt: skip
+
+    def tip_goes(share: float) -> float:
+        def load(insertion_mm: float) -> UniformField:
+            part = share if insertion_mm > 39.0 else 0.0
+            return UniformField(flux_mT=-1e3 * part * critical / LOAD_N_T, angle_deg=0)
+
+        last = navigate(
+            rod, tube, load, step_mm=4.0, support=DOWNWARD,
+            refine=False,
+        ).steps[-1]  # fmt: skip
+        held_up = weight * length_mm - last.wall_N
+        assert abs(held_up) < 0.02 * weight * length_mm
+        return math.hypot(last.tip_mm[1], last.tip_mm[2])
+
+    assert tip_goes(0.98) < 1e-6
+    assert tip_goes(1.02) > 1e-2
+
+
+def test_a_rod_pushed_from_its_tip_winds_into_a_torsion_free_helix():
+    """Energy EI sin^4 / 2 a^2 a length, at an angle psi to the axis, against F cos psi.
+
+    F = 2 EI sin^2 psi cos psi / a^2, which is 8 pi^2 EI / pitch^2 for small angles
+    (Lubinski, Althouse and Logan 1962); the wall bears EI sin^4 psi / a^3.
+    """
+    room_mm, pitch_mm = 0.5, 12.0
+    rod = round_rod(40.0, remanence_mT=100.0)
+    EI = stiffness(rod)
+    psi = math.atan(2.0 * math.pi * room_mm / pitch_mm)
+    push_N = 2.0 * EI * math.sin(psi) ** 2 * math.cos(psi) / room_mm**2
+    tube = Tube(name="straight", points_mm=[(0, 0, 0), (60, 0, 0)], radius_mm=1.0)
+    field = UniformField(flux_mT=-1e3 * push_N / LOAD_N_T, angle_deg=0.0)
+    last = navigate(rod, tube, field, step_mm=8.0, elements=16, refine=False).steps[-1]
+    x, y, z = last.shape[:3]
+    middle = (last.s_mm > 16.0) & (last.s_mm < 28.0)
+    assert np.hypot(y, z)[middle] == pytest.approx(room_mm, abs=1e-3)
+    turn = np.polyfit(x[middle], np.unwrap(np.arctan2(z, y))[middle], 1)[0]
+    assert 2.0 * math.pi / abs(turn) == pytest.approx(pitch_mm, rel=1e-3)
+    inside = [c.force_N for c in last.contacts if 16.0 < c.s_mm < 28.0]
+    bears = EI * math.sin(psi) ** 4 / room_mm**3
+    assert sum(inside) / 12.0 == pytest.approx(bears, rel=1e-2)
