@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.errors import InputError
 from ...core.specimen import Specimen
 from ...core.units import rad_from_deg
 from ..fields import Field
@@ -69,8 +70,19 @@ class Case:
         return self.lumen.mode != PUSH
 
     def flux(self, insertion_mm: float) -> Array:
-        """Return the field at an insertion, as the kernels take it."""
+        """Return the field at an insertion, as the kernels take it.
+
+        Raises
+        ------
+        InputError
+            If it would lift the rod out of the plane.
+        """
         given = self.field(insertion_mm) if callable(self.field) else self.field
+        if not given.in_plane:
+            raise InputError(
+                "a field in a planar lumen must be within its plane (elevation_deg 0, "
+                f"no offset in z); instead received {given}"
+            )
         return field_array(given, self.length_mm)
 
     def root(self, insertion_mm: float) -> Array:

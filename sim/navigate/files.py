@@ -168,6 +168,7 @@ class _Pose(FileModel):
     angle_deg: float | None = None
     gap_mm: PositiveFloat | None = None
     axis_angle_deg: float | None = None
+    elevation_deg: float | None = None
 
 
 class _Poses(FileModel):

@@ -12,10 +12,11 @@ import numpy as np
 from ...core.checks import shown
 from ...core.errors import InputError
 from ..fields import Field, UniformField
+from ..sources import Uniform
 
 KEYS = {
-    True: ("flux_mT", "angle_deg"),
-    False: ("gap_mm", "axis_angle_deg"),
+    True: ("flux_mT", "angle_deg", "elevation_deg"),
+    False: ("gap_mm", "axis_angle_deg", "elevation_deg"),
 }
 """What a pose may say of a uniform field, and of magnets."""
 
@@ -28,8 +29,9 @@ def moving(
     Parameters
     ----------
     field : Field or None
-        Magnets, which the poses move by their `gap_mm` and `axis_angle_deg`; None or a
-        uniform field: the poses give `flux_mT` and `angle_deg`.
+        Magnets, which the poses move by `gap_mm` and `axis_angle_deg`; None or a
+        uniform field: the poses give `flux_mT` and `angle_deg`. Both take
+        `elevation_deg`, which leads out of a planar lumen.
     poses : sequence of dict
         Each with `insertion_mm`, rising, and the same other keys. Before the first and
         after the last the field stays; between them it changes in a straight line.
@@ -64,6 +66,12 @@ def moving(
             f"insertion_mm of the poses must rise, in mm; instead received {at}"
         )
 
+    if "gap_mm" in given and not any(_takes(one, "gap_mm") for one in field.sources):  # type: ignore[union-attr]
+        raise InputError(
+            "poses with gap_mm must move a source that stands at a gap; instead all "
+            "sources have a centre_mm of their own"
+        )
+
     def here(insertion_mm: float) -> Field:
         now = {
             key: float(np.interp(insertion_mm, at, [pose[key] for pose in poses]))
@@ -71,8 +79,10 @@ def moving(
         }
         if uniform:
             start = field if isinstance(field, UniformField) else None
-            flux_mT = start.flux_mT if start else 0.0
-            return UniformField(**({"flux_mT": flux_mT} | now))
+            pose = {"flux_mT": start.flux_mT if start else 0.0} | now
+            if "elevation_deg" in pose:
+                return Field(Uniform(**pose))
+            return UniformField(**pose)
         return _moved(field, now)
 
     here(at[0])

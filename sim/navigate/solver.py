@@ -151,7 +151,7 @@ def planar_walk(
     InputError
         If it cannot enter, or would be lifted out of the plane.
     """
-    _check_plane(lumen, field, support)
+    _check_plane(lumen, support)
     lumen.check_rod(max(specimen.sides_mm))
     case = Case(
         specimen=specimen,
@@ -194,18 +194,12 @@ def _check_tube(tube: Tube, friction: float, tip: object) -> None:
         )
 
 
-def _check_plane(lumen: object, field: FieldOfWay, support: Support) -> None:
-    """Refuse what is no lumen, or would lift the rod out of its plane."""
+def _check_plane(lumen: object, support: Support) -> None:
+    """Refuse what is no lumen, or weight that would lift the rod out of its plane."""
     if not isinstance(lumen, Lumen):
         raise InputError(
             "lumen must be a Lumen, as channel(...) is, or a Tube; instead received "
             f"{shown(lumen)}"
-        )
-    first = field(0.0) if callable(field) else field
-    if not first.in_plane:
-        raise InputError(
-            "a field in a planar lumen must be within its plane (elevation_deg 0, no "
-            f"offset in z); instead received {first}"
         )
     if not support.in_plane:
         raise InputError(

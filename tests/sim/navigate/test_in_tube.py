@@ -271,6 +271,7 @@ def test_a_rod_that_lies_in_a_tube_buckles_as_a_beam_on_springs():
     assert tip_goes(1.02) > 1e-2
 
 
+@pytest.mark.slow
 def test_a_rod_pushed_from_its_tip_winds_into_a_torsion_free_helix():
     """Energy EI sin^4 / 2 a^2 a length, at an angle psi to the axis, against F cos psi.
 
