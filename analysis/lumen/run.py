@@ -208,8 +208,8 @@ def _write(folder: Path, result: InLumen, sources: Sequence[Path]) -> None:
         )  # fmt: skip
         for name, column in zip(POINTS, columns, strict=True):
             lines.loc[rows, name] = np.asarray(column)
-    rows = [_frame_cells(result.fed.get(str(image))) for image in frames["image"]]
-    frames[list(FRAMES)] = pd.DataFrame(rows, index=frames.index)
+    cells = [_frame_cells(result.fed.get(str(image))) for image in frames["image"]]
+    frames[list(FRAMES)] = pd.DataFrame(cells, index=frames.index)
     written = {
         "centrelines.csv": lines, "frames.csv": frames, "lumen.csv": lumen_table(result)
     }  # fmt: skip

@@ -30,7 +30,7 @@ from ...rig import (
     run,
     write_templates,
 )
-from ...rig.virtual import open_twin
+from ...rig.virtual import VirtualAxis, open_twin
 from ...sim.navigate import lumen_of
 from ...vision import (
     Calibration,
@@ -103,7 +103,10 @@ def open_twin_bench(
         seed=seed, clock=clock, log=log, camera={**swing, **(camera or {})},
     )  # fmt: skip
     if isinstance(bench, LumenBench):
-        bench.axes = devices.axes
+        axes = devices.axes.items()
+        bench.axes = {
+            name: axis for name, axis in axes if isinstance(axis, VirtualAxis)
+        }
     return bench, devices
 
 

@@ -1,3 +1,4 @@
+from .axis import VirtualAxis as VirtualAxis
 from .bench import (
     open_twin as open_twin,
 )

@@ -193,18 +193,24 @@ def read_lumen(path: Path) -> Lumen | Tube:
 
 
 def lumen_of(text: str) -> Lumen:
-    """Return the planar lumen of the text of a lumen file that was read before.
+    """Return the planar lumen of the text of a lumen file, as a run keeps it.
 
     Raises
     ------
-    InputError
-        If it is a tube in space.
+    ConfigError
+        If it is none.
     """
-    lumen = LumenModel.model_validate(tomllib.loads(text)).lumen()
-    if isinstance(lumen, Tube):
-        raise InputError(
-            "a lumen under the camera must be planar, of [[wall]]s or a [channel]; "
-            f"instead received tube {lumen.name!r}"
+    try:
+        lumen = LumenModel.model_validate(tomllib.loads(text)).lumen()
+    except (ValueError, InputError) as error:
+        first = str(error).splitlines()[0]
+        raise ConfigError(
+            f"the lumen of the plan cannot be used ({first}); magbend sim navigate "
+            "with its file says more"
+        ) from None
+    if not isinstance(lumen, Lumen):
+        raise ConfigError(
+            f"the lumen of a plan must be planar; instead received tube {lumen.name!r}"
         )
     return lumen
 

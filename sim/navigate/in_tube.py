@@ -166,13 +166,15 @@ class TubeWalk(Walk[TubeCase, TubeState]):
     ) -> tuple[int, TubeState]:
         return at_rest(self.case, old, insertion_mm, soft)
 
-    def _read(self, state: TubeState) -> SpatialStep:
-        case, rest, rod = self.case, state.rest, state.rod
+    def _push(self, state: TubeState) -> float:
+        rest, rod = state.rest, state.rod
         turns = root_strain(rod, rest.turn)
-        along = np.array(case.lumen.direction)
+        along = np.array(self.case.lumen.direction)
         stored = 0.5 * float(rod.stiff[0] @ turns**2)
-        state.push = -float(rest.load @ along) - stored
-        return read_step(case, state)
+        return -float(rest.load @ along) - stored
+
+    def _read(self, state: TubeState) -> SpatialStep:
+        return read_step(self.case, state)
 
     def _passed(self, before: Step, after: Step) -> list[str]:
         low, high = sorted((_along(before), _along(after)))

@@ -302,6 +302,8 @@ def settle(rod, field, walls, half, mu, u, t, held, before, soft):  # type: igno
             outcome = SETTLED if deepest < TOO_DEEP else JAMMED
             break
         failed += 1 if steps < 0 else 0
+        if failed > 2 and t.used[0] == 0:
+            break  # free, and lost: another round would be the same
         if k > 8 and worst > 1e-4:
             outcome = JAMMED
         if soft >= SOFT and (failed > 6 or (outcome == JAMMED and k > 14)):

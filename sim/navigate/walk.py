@@ -32,15 +32,19 @@ from .touch import TIP, Before, Touches, no_touches
 
 Array = NDArray[np.float64]
 
-FINEST = 64
+FINEST = 256
 """A step is halved down to this part of it before a jump counts as a snap."""
 JUMP = 4.0
 """A move beyond this many steps is looked at closely."""
+CAREFUL = 16
+"""A rod that moves so fast without a snap is followed by this part of a step."""
 LOSS = 1e-4
 """A snap loses more than this part of the energy."""
+LEAST = 1e-2
+"""Energy below which none is lost or won that matters, in EI / L."""
 EASE = 1e-3
 """Friction is fully mobilised by a slip of this part of a step."""
-SOFTEST = 1e2
+SOFTER = (1e2, 1e3, 1e4, 1e5)
 """Stiffness of the walls where a rod that snaps is to find its way past them."""
 WHY = {NO_ROOM: JAMMED, PULLED: PULLED_ON}
 
@@ -198,8 +202,12 @@ class Walk(ABC, Generic[C, S]):
         """Return the outcome of coming to rest, and the state; see `at_rest`."""
 
     @abstractmethod
+    def _push(self, state: S) -> float:
+        """Return the force that holds the rod there."""
+
+    @abstractmethod
     def _read(self, state: S) -> Step:
-        """Give a state its push, and return what a user sees of it."""
+        """Return what a user sees of a state."""
 
     @abstractmethod
     def _passed(self, before: Step, after: Step) -> list[str]:
@@ -227,12 +235,13 @@ class Walk(ABC, Generic[C, S]):
             if new is None:
                 step *= 0.5
                 continue
+            snapped = self._leaps(now, new)
             self._arrive(now, new)
             if abs(self.steps[-1].push_N) > self.limit_N:
                 self.outcome = LIMIT
                 return False
             now = new
-            step = min(2.0 * step, self.step_mm)
+            step = self.step_mm if snapped else min(2.0 * step, self.step_mm)
         return True
 
     def _here(self) -> S:
@@ -245,39 +254,74 @@ class Walk(ABC, Generic[C, S]):
         first = min(self.step_mm, target_mm)
         if self.case.tip is not None:
             first = target_mm
-        outcome, state = self._rest(None, first, SOFT)
+        outcome, state = self._come(None, first, SOFT)
         if outcome != SETTLED:
             self.outcome = WHY.get(outcome, LOST)
             return False
         self._arrive(None, state)
         return True
 
+    def _come(self, old: S | None, goal_mm: float, soft: float) -> tuple[int, S]:
+        """Come to rest, and know the push there."""
+        outcome, new = self._rest(old, goal_mm, soft)
+        if outcome == SETTLED:
+            new.push = self._push(new)
+        return outcome, new
+
     def _try(self, old: S, goal_mm: float, *, last_try: bool) -> S | None:
         """Return the state at a goal; None if a finer step is needed, or none is."""
-        outcome, new = self._rest(old, goal_mm, SOFT)
-        calm = not self._leaps(old, new)
-        if outcome == SETTLED and (calm or last_try):
+        outcome, new = self._come(old, goal_mm, SOFT)
+        taken = abs(goal_mm - old.insertion_mm)
+        moved = new.moved * self.case.length_mm
+        fast = moved > JUMP * taken and taken > self.step_mm / CAREFUL
+        if outcome == SETTLED and not fast and not self._leaps(old, new):
             return new
         if not last_try:
             return None
-        again, new = self._rest(old, goal_mm, SOFTEST)
-        if again == SETTLED:
-            return new
+        again, risen = outcome, new if outcome == SETTLED else None
+        for soft in (SOFT, *(SOFTER if self.steps[-1].contacts else ())):
+            if soft != SOFT:
+                again, new = self._come(old, goal_mm, soft)
+            if again == SETTLED and not self._rises(old, new):
+                return new
+            risen = new if risen is None and again == SETTLED else risen
+        if risen is not None:
+            return risen
         lost = OVERPOWERED if self.case.flux(goal_mm)[0] != UNIFORM else LOST
         self.outcome = WHY.get(again) or WHY.get(outcome) or lost
         return None
 
     def _leaps(self, old: S, new: S) -> bool:
-        """Return whether a step moves the rod far, and loses energy on the way."""
+        """Return whether a step moves the rod far, and energy is lost or won by it."""
         taken = (new.insertion_mm - old.insertion_mm) / self.case.length_mm
-        lost = self._released(old, new)
-        scale = abs(new.energy) + abs(old.energy) + abs(old.push * taken)
-        return new.moved > JUMP * abs(taken) and lost > LOSS * scale
+        if new.moved <= JUMP * abs(taken):
+            return False
+        lost, much = self._released(old, new), LOSS * self._scale(old, new)
+        return lost > much or self._rises(old, new)
+
+    def _rises(self, old: S, new: S) -> bool:
+        """Return whether a step gains energy from nowhere: no rod snaps uphill.
+
+        A field that moves may give any.
+        """
+        won = -self._released(old, new)
+        return not callable(self.case.field) and won > LOSS * self._scale(old, new)
+
+    def _scale(self, old: S, new: S) -> float:
+        taken = (new.insertion_mm - old.insertion_mm) / self.case.length_mm
+        return LEAST + abs(new.energy) + abs(old.energy) + abs(old.push * taken)
 
     def _released(self, old: S, new: S) -> float:
-        """Return the energy that is neither stored, nor rubbed away, nor work."""
+        """Return the energy that is neither stored, nor rubbed away, nor work.
+
+        The work is that of the push before, where the push falls, as at a snap; where
+        it rises, of the mean of both.
+        """
         taken = (new.insertion_mm - old.insertion_mm) / self.case.length_mm
-        return old.energy + old.push * taken - new.rubbed - new.energy
+        push = old.push
+        if (new.push - old.push) * taken > 0.0:
+            push = 0.5 * (old.push + new.push)
+        return old.energy + push * taken - new.rubbed - new.energy
 
     def _arrive(self, old: S | None, new: S) -> None:
         self.state = new
@@ -324,15 +368,18 @@ class PlanarWalk(Walk[Case, State]):
     ) -> tuple[int, State]:
         return at_rest(self.case, old, insertion_mm, soft)
 
-    def _read(self, state: State) -> Step:
+    def _push(self, state: State) -> float:
         case, rod, u = self.case, state.rod, state.u
         field = case.flux(state.insertion_mm)
         load = loads(rod, field, u, state.touches, state.rubbing, state.held)
-        state.push = push_force(rod, field, u, load, slides=case.feeds)
+        return push_force(rod, field, u, load, slides=case.feeds)
+
+    def _read(self, state: State) -> Step:
+        case = self.case
         return read_step(
             state.insertion_mm,
-            rod,
-            u,
+            state.rod,
+            state.u,
             state.touches,
             case.pieces,
             push=state.push,

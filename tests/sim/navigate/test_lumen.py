@@ -18,6 +18,7 @@ from magbend.sim.navigate import (
     Wall,
     channel,
     circle,
+    lumen_of,
     moving,
     navigate,
     polyline,
@@ -255,3 +256,9 @@ def test_poses_move_a_magnet_whatever_gap_it_had():
     for start in (MagnetField(magnet=cube, gap_mm=100.0), Field(cuboid_of(cube))):
         there = moving(start, [pose])(3.0)
         assert there == Field(MagnetField(magnet=turned, gap_mm=45.0).sources)
+
+
+@pytest.mark.parametrize("text", ["name = 3", "name = [", 'name = "a"\n'])
+def test_the_text_of_a_lumen_in_a_plan_is_refused_in_a_sentence(text):
+    with pytest.raises(ConfigError, match="the lumen of the plan cannot be used"):
+        lumen_of(text)
