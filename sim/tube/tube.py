@@ -86,6 +86,13 @@ class Tube:
                 )
         store(self, points_mm=tuple(points), radius_mm=self._radii(len(points)))
         store(self, direction=self._towards())
+        if self.direction is not None and self.entry_mm is None:
+            chord = np.subtract(points[1], points[0])
+            if chord @ self.direction < 0.1 * np.linalg.norm(chord):
+                raise InputError(
+                    f"direction of tube {self.name!r} must lead from its first point "
+                    f"toward its second; instead received {self.direction}"
+                )
         first = self.direction if self.entry_mm is None else None
         store(self, _bore=_bore_of(np.array(points), np.array(self.radius_mm), first))
         _check_turns(self)
@@ -96,6 +103,13 @@ class Tube:
         entry = vector(entry, "entry_mm", "mm", LONGEST_MM)
         store(self, entry_mm=entry, direction=vector(towards, "direction"))
         gates = tuple(g for g in self.gates if g.name != "end")
+        for gate in gates:
+            if not 0.0 < gate.at_mm <= self.length_mm:
+                raise InputError(
+                    f"gate {gate.name!r} must be within tube {self.name!r}, up to "
+                    f"{self.length_mm:.4g} mm along its curve; instead received "
+                    f"{gate.at_mm:g} mm"
+                )
         store(self, gates=(*gates, Ring("end", self.length_mm)))
 
     def _radii(self, count: int) -> tuple[float, ...]:

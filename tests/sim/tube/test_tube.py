@@ -81,6 +81,8 @@ def test_a_gate_at_the_end_is_always_there():
         ({"entry_mm": (5.0, 9.0, 0.0)}, "is -7 mm from its wall"),
         ({"entry_mm": (-3.0, 0.0, 0.0)}, "is beyond its ends"),
         ({"entry_mm": (5, 0, 0), "direction": (0, 1, 0)}, "must lead into it"),
+        ({"direction": (-1.0, 0.0, 0.0)}, "must lead from its first point toward"),
+        ({"gates": (Ring("far", 30.0),)}, "up to 20 mm along its curve"),
         ({"direction": (0.0, 0.0, 0.0)}, r"must not be \(0, 0, 0\)"),
     ],
 )
