@@ -294,3 +294,26 @@ def test_a_rod_pushed_from_its_tip_winds_into_a_torsion_free_helix():
     inside = [c.force_N for c in last.contacts if 16.0 < c.s_mm < 28.0]
     bears = EI * math.sin(psi) ** 4 / room_mm**3
     assert sum(inside) / 12.0 == pytest.approx(bears, rel=1e-2)
+
+
+def test_a_rod_snaps_on_and_snaps_back_later():
+    """Where the tube widens the tip leaves the wall, and on the way back returns late."""
+    points = [
+        (0.0, 0.0, 0.0), (4.8, -3.4, -2.2), (10.6, -5.4, 2.7), (13.2, -0.8, 8.5),
+        (15.3, 2.7, 13.0), (18.7, 6.2, 16.4), (15.8, 9.3, 21.2),
+    ]  # fmt: skip
+    tube = Tube(
+        name="wide and narrow", points_mm=points,
+        radius_mm=(1.88, 1.78, 2.79, 1.09, 2.21, 1.63, 0.95),
+    )  # fmt: skip
+    passage = navigate(
+        gmc(2), tube, NOTHING, way_mm=(22.0, 19.5), step_mm=0.5, refine=False
+    )
+    on, back = passage.snaps
+    assert back.insertion_mm < on.insertion_mm - 0.05
+    assert on.moved_mm > 0.5
+    assert on.released_Nmm > 0.0
+    assert back.released_Nmm > 0.0
+    first, *_, last = (s for s in passage.steps if s.insertion_mm == 19.5)
+    assert math.dist(first.tip_mm, last.tip_mm) < 1e-6
+    assert passage.most("overlap_mm") < 1e-3
