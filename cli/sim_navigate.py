@@ -129,6 +129,7 @@ def _field(
 
 def _summary(passage: Passage) -> dict[str, Any]:
     last = passage.steps[-1]
+    in_tube = {name: passage.most(name) for name in IN_TUBE[1:] if hasattr(last, name)}
     return {
         "lumen": passage.lumen,
         "specimen": passage.specimen,
@@ -148,7 +149,7 @@ def _summary(passage: Passage) -> dict[str, Any]:
             {name: getattr(event, name) for name in event.__slots__}
             for event in passage.events
         ],
-    }
+    } | in_tube
 
 
 COLUMNS = (
@@ -222,5 +223,7 @@ def _print(data: dict[str, Any], passage: Passage) -> None:
             f"{event.moved_mm:.2f} mm and loses {event.released_Nmm:.3g} N mm"
         )
     say(f"  overlap         {data['overlap_mm']:.1e} mm at most, between contacts")
+    if "residual_Nmm" in data:
+        say(f"  out of balance  {data['residual_Nmm']:.1e} N mm at most")
     if data["error_mm"] == data["error_mm"]:
         say(f"  error           {data['error_mm']:.1e} mm, of the last shape")

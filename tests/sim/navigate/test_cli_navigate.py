@@ -27,7 +27,9 @@ from magbend.sim.navigate import (
 )
 
 FIXTURES = Path(__file__).resolve().parents[3] / "fixtures"
-FORK, BEND = (str(FIXTURES / "lumens" / name) for name in ("fork.toml", "bend90.toml"))
+FORK, BEND, ARCH = (
+    str(FIXTURES / "lumens" / f"{name}.toml") for name in ("fork", "bend90", "arch")
+)
 RUN = CliRunner()
 
 
@@ -56,6 +58,28 @@ def test_a_passage_is_printed_and_written(tmp_path):
     assert (forces["force_N"] > 0.0).all()
 
 
+def test_a_passage_through_a_tube_is_printed_and_written(tmp_path):
+    out = tmp_path / "passage"
+    text = run(
+        "navigate", ARCH, "--gmc", "2", "--field-mT", "20", "--elevation-deg", "40",
+        "--step-mm", "5", "--out", str(out),
+    )  # fmt: skip
+    assert "GMC 2 in arch: inserted" in text
+    assert "gates           top" in text
+    shape = np.genfromtxt(out / "shape.csv", delimiter=",", names=True)
+    assert shape["s_mm"][-1] == pytest.approx(30.0)
+    tangent = np.array([shape[name] for name in ("tx", "ty", "tz")])
+    assert np.linalg.norm(tangent, axis=0) == pytest.approx(1.0)
+    steps = np.genfromtxt(out / "steps.csv", delimiter=",", names=True)
+    assert steps["tip_z_mm"][-1] == pytest.approx(shape["z_mm"][-1])
+    assert (steps["residual_Nmm"] < 1e-7).all()
+    forces = np.genfromtxt(out / "contacts.csv", delimiter=",", names=True)
+    assert (forces["along_mm"] > 0.0).all()
+    for name in ("passage.png", "passage.gif"):
+        with Image.open(out / name) as picture:
+            assert np.ptp(np.asarray(picture.convert("L"))) > 100
+
+
 def test_json_holds_every_step_and_contact():
     data = json.loads(
         run("navigate", BEND, "--gmc", "2", "--way-mm", "14", "--json")
@@ -70,6 +94,7 @@ def test_json_holds_every_step_and_contact():
     [
         (("nowhere.toml", "--gmc", "2"), "there is no such file"),
         ((BEND, "--gmc", "9"), "GMC number must be from 1 to 7"),
+        ((ARCH, "--gmc", "2", "--friction", "0.1"), "friction must be 0 in tube"),
         ((BEND, "--gmc", "2", "--friction", "nan"), "friction must be a finite number"),
     ],
 )

@@ -297,7 +297,7 @@ def test_a_rod_pushed_from_its_tip_winds_into_a_torsion_free_helix():
 
 
 def test_a_rod_snaps_on_and_snaps_back_later():
-    """Where the tube widens the tip leaves the wall, and on the way back returns late."""
+    """Where the tube widens the tip leaves the wall, and returns late on the way."""
     points = [
         (0.0, 0.0, 0.0), (4.8, -3.4, -2.2), (10.6, -5.4, 2.7), (13.2, -0.8, 8.5),
         (15.3, 2.7, 13.0), (18.7, 6.2, 16.4), (15.8, 9.3, 21.2),
