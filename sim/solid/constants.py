@@ -37,14 +37,17 @@ class SolidConstants:
         Cowper's shear coefficient k.
     tension_bending, tension_torsion : float
         Increase of curvature and twist, at a given moment, per axial strain.
-    tension_twice : float
-        Increase of the axial compliance per axial strain.
+    tension_twice, bending_twice : float
+        Increase of the axial compliance per axial strain, and of the bending compliance
+        per its square.
     soften : tuple of float
         Increase of curvature per x^2 at a given moment.
     stiff : tuple of float
         s in the energy's sixth order, E A (s_1 x_1^2 + s_2 x_2^2)^3 / 6.
     cross : tuple of float
         c in the energy E A c x_i^2 x_j^2 / 2 of the pairs 12, 13, 23.
+    bow : tuple of float
+        b in the energy N (x_1^2 + x_2^2) (b_1 x_1^2 + b_2 x_2^2) / 4.
     turn, shift : tuple of float
         Seen from afar the rod starts turned by -turn kappa(0) of a size, and shifted by
         shift kappa(0) of a size squared.
@@ -56,9 +59,11 @@ class SolidConstants:
     tension_bending: float
     tension_torsion: float
     tension_twice: float
+    bending_twice: float
     soften: tuple[float, float]
     stiff: tuple[float, float]
     cross: tuple[float, float, float]
+    bow: tuple[float, float]
     turn: tuple[float, float]
     shift: tuple[float, float]
     twist_turn: float
@@ -70,7 +75,7 @@ def solid_constants(across: CrossSection, poisson_ratio: float) -> SolidConstant
     Parameters
     ----------
     across : CrossSection
-        Sides of a rectangle at most 4 to 1; no tube.
+        Sides of a rectangle at most 3 to 1; bore of a tube 0.2 to 0.5 of its diameter.
     poisson_ratio : float
         From 0 to 0.5.
 
@@ -83,7 +88,8 @@ def solid_constants(across: CrossSection, poisson_ratio: float) -> SolidConstant
     -----
     A neo-Hookean fibre gives what tension does, whatever the shape: its compliance
     grows by (14 + 28 nu - 40 nu^2) / 9 per strain, that of bending by 2 nu more, since
-    fibres come nearer to the axis.
+    fibres come nearer to the axis, and by (31 - 6 nu + 228 nu^2 - 320 nu^3) / 9 per
+    strain squared.
     """
     nu = within(poisson_ratio, 0.0, 0.5, "poisson_ratio", "")
     family, place = _place(across)
@@ -95,9 +101,11 @@ def solid_constants(across: CrossSection, poisson_ratio: float) -> SolidConstant
         tension_bending=fibre + 2.0 * nu,
         tension_torsion=ahead["tension_torsion"],
         tension_twice=fibre,
+        bending_twice=(31.0 - nu * (6.0 - nu * (228.0 - nu * 320.0))) / 9.0,
         soften=(aside["soften"], ahead["soften"]),
         stiff=(aside["stiff"], ahead["stiff"]),
         cross=(ahead["cross_bending"], aside["cross_torsion"], ahead["cross_torsion"]),
+        bow=(aside["bow"], ahead["bow"]),
         turn=(aside["turn"], ahead["turn"]),
         shift=(aside["shift"], ahead["shift"]),
         twist_turn=ahead["twist_turn"],
@@ -125,19 +133,23 @@ def _place(across: CrossSection) -> tuple[str, float]:
     """Return the family of a section, and its place there."""
     if not across.is_round:
         ratio = across.width_mm / across.height_mm
-        if not 0.2499 < ratio < 4.001:
+        if not 1.0 / 3.0 <= ratio <= 3.0:
             raise InputError(
-                "the solid model takes rectangles of sides at most 4 to 1; instead "
+                "the solid model takes rectangles of sides at most 3 to 1; instead "
                 f"received {across.width_mm:g} mm x {across.height_mm:g} mm: use model "
                 "'rod'"
             )
         return "rectangle", math.log(ratio)
     if across.bore_mm == 0.0:
         return "round", 0.0
-    raise InputError(
-        "the solid model takes no tubes; instead received one of bore "
-        f"{across.bore_mm:g} mm: use model 'rod'"
-    )
+    bore = across.bore_mm / across.width_mm
+    if not 0.2 <= bore <= 0.5:
+        raise InputError(
+            "the solid model takes tubes with a bore of 0.2 to 0.5 of the diameter; "
+            f"instead received {across.bore_mm:g} mm of {across.width_mm:g} mm: use "
+            "model 'rod'"
+        )
+    return "tube", bore
 
 
 def _interpolated(family: str, place: float, nu: float) -> dict[str, float]:

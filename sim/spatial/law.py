@@ -5,8 +5,10 @@ here. With the linear strains k_i = C_i m_i and e = T N, the curvatures k_i (1 +
 the stretch and the shears are derivatives of one complementary energy by m, N and Q, so
 that work is conserved:
 
-    r_i^2 f_i = r_i^2 alpha_i e + sum_j P_ij k_j^2 + S_i (S_1 k_1^2 + S_2 k_2^2)^2
-    eps       = e + NU e^2 / 2 + sum_i alpha_i r_i^2 k_i^2 / 2,    gamma_i = G_i Q_i
+    r_i^2 f_i = r_i^2 (alpha_i e + beta_i e^2) + sum_j P_ij k_j^2
+                + S_i (S_1 k_1^2 + S_2 k_2^2)^2 + e (A_i V + B_i U) / 2
+    eps       = e + NU e^2 / 2 + sum_i (alpha_i / 2 + beta_i e) r_i^2 k_i^2 + U V / 4
+    gamma_i   = G_i Q_i,    U = A_1 k_1^2 + A_2 k_2^2,    V = B_1 k_1^2 + B_2 k_2^2
 
 where r_i^2 is the stiffness of k_i over that of e. Dimensionless as `spatial.march`.
 """
@@ -22,12 +24,12 @@ from ..magnet.flux import flux_at
 
 (
     T, G1, G2, BEND, TWIST, STRETCH, R1, R2, R3,
-    P11, P22, P12, P13, P23, S1, S2, FACE1, FACE2, SHARE,
-) = range(13, 32)  # fmt: skip
+    P11, P22, P12, P13, P23, S1, S2, FACE1, FACE2, BEND2, A1, A2, B1, B2, SHARE,
+) = range(13, 37)  # fmt: skip
 """Compliances of stretch and shear; alpha of bending and torsion; `NU`; r_i^2; P; S;
-where along d1 and d2 the four Gauss points of the end face are; and the first of three
-shares of the section's own compliances that an end of it has."""
-SOLID_WIDTH = 34
+where along d1 and d2 the four Gauss points of the end face are; beta of bending; A; B;
+and the first of three shares of a section's own compliances that an end of it has."""
+SOLID_WIDTH = 39
 _C1, _WX = 1, 10
 """Where a row's three compliances and its weight begin, as in `march`."""
 
@@ -48,28 +50,38 @@ def strains(p, y, v, H):  # type: ignore[no-untyped-def]
     f0 = p[P11] * b0 + p[P12] * b1 + p[P13] * b2 + p[S1] * g * g
     f1 = p[P12] * b0 + p[P22] * b1 + p[P23] * b2 + p[S2] * g * g
     f2 = p[P13] * b0 + p[P23] * b1
-    f0 = 1.0 + p[BEND] * e + f0 / p[R1]
-    f1 = 1.0 + p[BEND] * e + f1 / p[R2]
+    U, V = p[A1] * b0 + p[A2] * b1, p[B1] * b0 + p[B2] * b1
+    bend = 1.0 + p[BEND] * e + p[BEND2] * e * e
+    f0 = bend + (f0 + 0.5 * e * (p[A1] * V + p[B1] * U)) / p[R1]
+    f1 = bend + (f1 + 0.5 * e * (p[A2] * V + p[B2] * U)) / p[R2]
     f2 = 1.0 + p[TWIST] * e + f2 / p[R3]
     v[0], v[1], v[2] = k0 * f0, k1 * f1, k2 * f2
     v[3], v[4] = p[G1] * H[6, 0], p[G2] * H[6, 1]
-    bow = p[BEND] * (p[R1] * b0 + p[R2] * b1) + p[TWIST] * p[R3] * b2
+    bent = p[R1] * b0 + p[R2] * b1
+    bow = (p[BEND] + 2.0 * p[BEND2] * e) * bent + p[TWIST] * p[R3] * b2 + 0.5 * U * V
     v[5] = e + 0.5 * p[STRETCH] * e * e + 0.5 * bow
     H[:6] = 0.0
     s = 2.0 * g
-    H[0, 0] = p[_C1] * (f0 + 2.0 * b0 * (p[P11] + s * p[S1] ** 2) / p[R1])
-    H[1, 1] = p[_C1 + 1] * (f1 + 2.0 * b1 * (p[P22] + s * p[S2] ** 2) / p[R2])
+    g0 = p[P11] + s * p[S1] ** 2 + e * p[A1] * p[B1]
+    g1 = p[P22] + s * p[S2] ** 2 + e * p[A2] * p[B2]
+    H[0, 0] = p[_C1] * (f0 + 2.0 * b0 * g0 / p[R1])
+    H[1, 1] = p[_C1 + 1] * (f1 + 2.0 * b1 * g1 / p[R2])
     H[2, 2] = p[_C1 + 2] * f2
     # C_i r_i^2 = T makes the rest symmetric.
     per = 2.0 * p[T] / (p[R1] * p[R2] * p[R3])
-    H[0, 1] = H[1, 0] = per * p[R3] * k0 * k1 * (p[P12] + s * p[S1] * p[S2])
+    g2 = p[P12] + s * p[S1] * p[S2] + 0.5 * e * (p[A1] * p[B2] + p[A2] * p[B1])
+    H[0, 1] = H[1, 0] = per * p[R3] * k0 * k1 * g2
     H[0, 2] = H[2, 0] = per * p[R2] * k0 * k2 * p[P13]
     H[1, 2] = H[2, 1] = per * p[R1] * k1 * k2 * p[P23]
-    H[0, 5] = H[5, 0] = p[BEND] * p[T] * k0
-    H[1, 5] = H[5, 1] = p[BEND] * p[T] * k1
+    slope = p[BEND] + 2.0 * p[BEND2] * e
+    H[0, 5] = slope + 0.5 * (p[A1] * V + p[B1] * U) / p[R1]
+    H[1, 5] = slope + 0.5 * (p[A2] * V + p[B2] * U) / p[R2]
+    H[0, 5] *= p[T] * k0
+    H[1, 5] *= p[T] * k1
+    H[5, 0], H[5, 1] = H[0, 5], H[1, 5]
     H[2, 5] = H[5, 2] = p[TWIST] * p[T] * k2
     H[3, 3], H[4, 4] = p[G1], p[G2]
-    H[5, 5] = p[T] * (1.0 + p[STRETCH] * e)
+    H[5, 5] = p[T] * (1.0 + p[STRETCH] * e + p[BEND2] * bent)
 
 
 @njit(cache=True)
@@ -78,7 +90,7 @@ def axis(rows, states, directors, curvature):  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    rows : ndarray, shape (n, 34)
+    rows : ndarray, shape (n, 39)
         The section at each station.
     states : ndarray, shape (n, 18)
         The state there, as of `march`.
