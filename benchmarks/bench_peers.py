@@ -16,7 +16,7 @@ dead load at the tip that the field reduces to, so none of them evaluates a fiel
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -198,10 +198,15 @@ TABLES = {
 }
 
 
-def main(names: list[str]) -> None:
+def main() -> None:
     """Print the tables, or those named."""
+    asked = argparse.ArgumentParser(description=__doc__)
+    asked.add_argument("tables", nargs="*", help=f"of {', '.join(TABLES)}")
+    names = asked.parse_args().tables or list(TABLES)
+    if unknown := set(names) - set(TABLES):
+        asked.error(f"there is no table {', '.join(unknown)}")
     print(f"a millionth of the length is {AIM:.0e} mm")
-    for name in names or TABLES:
+    for name in names:
         print(f"\n{name:34} {'time':>13} {'ratio':>9} {'error, mm':>10}")
         ours = 0.0
         for peer in TABLES[name]:
@@ -217,4 +222,4 @@ def main(names: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

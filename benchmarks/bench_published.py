@@ -9,6 +9,7 @@ docs/explanations/published.md tells the columns of a table.
 
 from __future__ import annotations
 
+import argparse
 import math
 import sys
 from dataclasses import dataclass
@@ -267,14 +268,15 @@ def draw(rows: list[Row], out: Path) -> None:
     plt.close(figure)
 
 
-def main(names: list[str]) -> int:
+def main() -> int:
     """Predict, print and draw every table."""
-    figure = None
-    if names[:1] == ["--figure"]:
-        figure, names = Path(names[1]), names[2:]
+    asked = argparse.ArgumentParser(description=__doc__)
+    asked.add_argument("tables", nargs="*", type=Path, help="all of ours, by default")
+    asked.add_argument("--figure", type=Path, help="a picture of all of them")
+    told = asked.parse_args()
     everything = []
     try:
-        for path in [Path(name) for name in names] or sorted(TABLES.glob("*.csv")):
+        for path in told.tables or sorted(TABLES.glob("*.csv")):
             print(path.name)
             rows = predict(path)
             print_rows(rows)
@@ -283,10 +285,10 @@ def main(names: list[str]) -> int:
     except MagbendError as error:
         print(error, file=sys.stderr)
         return 1
-    if figure is not None:
-        draw(everything, figure)
+    if told.figure is not None:
+        draw(everything, told.figure)
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())

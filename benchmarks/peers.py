@@ -174,8 +174,6 @@ def cables(elements: int, *, weight: bool) -> Callable[[], Array]:
     settings = exu.SimulationSettings()
     settings.solution.file.write = False
     settings.staticSolver.verboseMode = 0
-    settings.staticSolver.newton.relativeTolerance = 1e-11
-    settings.staticSolver.newton.absoluteTolerance = 1e-13
     settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
     rest = np.zeros_like(mbs.systemData.GetODE2Coordinates())
 
