@@ -19,6 +19,9 @@ from .batch.shapes import (
 from .batch.shapes import (
     solve_shapes as solve_shapes,
 )
+from .batch.space import (
+    solve_spatial_many as solve_spatial_many,
+)
 from .batch.threads import (
     cores as cores,
 )

@@ -16,6 +16,9 @@ from .shapes import (
 from .shapes import (
     solve_shapes as solve_shapes,
 )
+from .space import (
+    solve_spatial_many as solve_spatial_many,
+)
 from .threads import (
     cores as cores,
 )

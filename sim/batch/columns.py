@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.arrays import real_array
 from ...core.checks import positive, shown, within
+from ...core.cross_section import ALL_SIZES, SIZES
 from ...core.errors import InputError
 from ...core.magnet import Magnet
 from ...core.sources import FLUX_LIMIT_T
 from ..fields import Field, before
+
+Array = NDArray[np.float64]
 
 COLUMNS = {
     "side_mm": (1e-9, 1e9, "mm"),
@@ -22,13 +27,25 @@ COLUMNS = {
     "E_MPa": (1e-9, 1e9, "MPa"),
     "gap_mm": (1e-9, 1e9, "mm"),
     "remanence_mT": (-FLUX_LIMIT_T * 1e3, FLUX_LIMIT_T * 1e3, "mT"),
+    "remanence_y_mT": (-FLUX_LIMIT_T * 1e3, FLUX_LIMIT_T * 1e3, "mT"),
+    "remanence_z_mT": (-FLUX_LIMIT_T * 1e3, FLUX_LIMIT_T * 1e3, "mT"),
+    "natural_curvature_per_mm": (-1e3, 1e3, "1/mm"),
+    "density_kg_m3": (1e-9, 1e9, "kg/m3"),
     "flux_mT": (-FLUX_LIMIT_T * 1e3, FLUX_LIMIT_T * 1e3, "mT"),
     "angle_deg": (-36000.0, 36000.0, "deg"),
+    "elevation_deg": (-90.0, 90.0, "deg"),
 }
 """Least and largest value of each column, and its unit."""
 
+WIDE = ("length_mm", "E_MPa")
+PER_SECTION = (
+    *ALL_SIZES, "remanence_mT", "remanence_y_mT", "remanence_z_mT",
+    "natural_curvature_per_mm",
+)  # fmt: skip
+"""Columns that have a value for each section, or may have."""
 
-def column(name: str, values: ArrayLike) -> NDArray[np.float64]:
+
+def column(name: str, values: ArrayLike) -> Array:
     """Return a column as an array of floats.
 
     Raises
@@ -83,3 +100,84 @@ def check_magnet(magnet: object) -> None:
 def waits_for_gap(magnet: Magnet | Field | None) -> bool:
     """Tell whether designs before a magnet have a column gap_mm."""
     return magnet is not None and before(magnet).follows_gap
+
+
+def columns_of(
+    designs: Mapping[str, ArrayLike] | NDArray[np.void],
+    magnet: Magnet | Field | None,
+    more: set[str],
+) -> dict[str, Array]:
+    """Return the columns, checked: those of sections (n, k), the others (n,).
+
+    `more` are those that may be there besides what all batch solvers ask for.
+
+    Raises
+    ------
+    InputError
+        If a column is missing or of another length, or holds a value that cannot be.
+    """
+    arrays = _given(designs, magnet, more)
+    n = max((len(a) for k, a in arrays.items() if a.ndim > (k in WIDE)), default=1)
+    if arrays["length_mm"].ndim == 0 or arrays["length_mm"].shape[-1] == 0:
+        raise InputError(
+            "designs: length_mm in mm must have a column for each section of the rods; "
+            f"instead received shape {arrays['length_mm'].shape}"
+        )
+    sections = arrays["length_mm"].shape[-1]
+    for name, array in arrays.items():
+        full = (n, sections) if name in (*WIDE, *PER_SECTION) else (n,)
+        fits = array
+        if array.ndim == 1 and name in PER_SECTION:
+            fits = array[:, None]
+        try:
+            arrays[name] = np.ascontiguousarray(np.broadcast_to(fits, full))
+        except ValueError:
+            raise InputError(
+                f"designs: {name} in {COLUMNS[name][2]} must fit {n} designs of "
+                f"{sections} sections; instead received shape {array.shape}"
+            ) from None
+    if "bore_mm" in arrays and np.any(arrays["bore_mm"] >= arrays["diameter_mm"]):
+        raise InputError(
+            "designs: every bore_mm in mm must be below its diameter_mm; instead "
+            "received one that is not"
+        )
+    return arrays
+
+
+def _given(
+    designs: Mapping[str, ArrayLike] | NDArray[np.void],
+    magnet: Magnet | Field | None,
+    more: set[str],
+) -> dict[str, Array]:
+    """Return the columns as they are given, their names and values checked."""
+    given = designs.dtype.names if isinstance(designs, np.ndarray) else designs
+    known_kind = isinstance(given, (Mapping, tuple)) or hasattr(given, "columns")
+    if given is None or not known_kind:
+        raise InputError(
+            "designs must be a mapping of columns or a structured array; instead "
+            f"received {shown(designs)}"
+        )
+    names = [str(name) for name in given]
+    sizes = {name for name in names if name in ALL_SIZES} or {"side_mm"}
+    if sizes not in [set(given) for given in SIZES.values()]:
+        raise InputError(
+            "designs must have the sizes of one shape, in mm: side_mm, or width_mm and "
+            "height_mm, or diameter_mm with or without bore_mm; instead received "
+            f"{', '.join(sorted(sizes))}"
+        )
+    wanted = {"length_mm", "E_MPa", "remanence_mT"} | sizes
+    if magnet is None:
+        wanted |= {"flux_mT"}
+    elif waits_for_gap(magnet):
+        wanted |= {"gap_mm"}
+    if not wanted <= set(names) <= wanted | more:
+        may = f", and may have {', '.join(sorted(more))}" if more else ""
+        raise InputError(
+            f"designs must have the columns {', '.join(sorted(wanted))} in mm, MPa and "
+            f"mT (flux_mT without a magnet, gap_mm if it waits for one){may}; instead "
+            f"received {', '.join(sorted(names))[:200]}"
+        )
+    arrays = {name: column(name, designs[name]) for name in names}
+    if magnet is None:
+        arrays.setdefault("angle_deg", np.array(90.0))
+    return arrays

@@ -13,9 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import shown, whole
-from ...core.cross_section import ALL_SIZES, SIZES
-from ...core.errors import InputError
+from ...core.checks import whole
+from ...core.cross_section import ALL_SIZES
 from ...core.jit import plain_first
 from ...core.magnet import Magnet
 from ...core.progress import Progress, silent
@@ -23,7 +22,7 @@ from ..fields import PULLED_IN, STABLE, UNSTABLE, Field, before, outside
 from ..magnet.field import magnet_block
 from ..planar.solver import OK_UNSTABLE, TOUCHES, solve_planar_rows
 from ..scaling import direction, field_rows, many_rods, uniform_rows
-from .columns import COLUMNS, check_magnet, column, waits_for_gap
+from .columns import check_magnet, columns_of
 from .lanes import HARD, solve_lanes
 from .threads import in_threads
 
@@ -47,8 +46,6 @@ RESULT = np.dtype(
 CHUNK = 4096
 _ORDER = 12
 _STEP = 0.4
-_WIDE = ("length_mm", "E_MPa")
-_PER_SECTION = (*ALL_SIZES, "remanence_mT")
 _MOST_THREADS = 1024
 FEW = 1000
 """Numbers in a column that plain Python gets through in about a second."""
@@ -113,7 +110,9 @@ def solve_many(
     >>> np.round(tips["tip_y_mm"], 3).tolist()
     [3.621, 4.71]
     """
-    columns = _columns(designs, magnet)
+    if magnet is not None:
+        check_magnet(magnet)
+    columns = columns_of(designs, magnet, {"angle_deg"} if magnet is None else set())
     n = len(columns["remanence_mT"])
     out = np.empty(n, dtype=RESULT)
     for name in RESULT.names or ():
@@ -127,77 +126,6 @@ def solve_many(
 
     in_threads(work, n, CHUNK, threads=threads, progress=progress, stop=stop)
     return out
-
-
-def _columns(
-    designs: Mapping[str, ArrayLike] | NDArray[np.void], magnet: Magnet | Field | None
-) -> dict[str, Array]:
-    """Return the columns, checked: those of sections (n, k), the others (n,)."""
-    if magnet is not None:
-        check_magnet(magnet)
-    arrays = _given(designs, magnet)
-    n = max((len(a) for k, a in arrays.items() if a.ndim > (k in _WIDE)), default=1)
-    if arrays["length_mm"].ndim == 0 or arrays["length_mm"].shape[-1] == 0:
-        raise InputError(
-            "designs: length_mm in mm must have a column for each section of the rods; "
-            f"instead received shape {arrays['length_mm'].shape}"
-        )
-    sections = arrays["length_mm"].shape[-1]
-    for name, array in arrays.items():
-        full = (n, sections) if name in (*_WIDE, *_PER_SECTION) else (n,)
-        fits = array
-        if array.ndim == 1 and name in _PER_SECTION:
-            fits = array[:, None]
-        try:
-            arrays[name] = np.ascontiguousarray(np.broadcast_to(fits, full))
-        except ValueError:
-            raise InputError(
-                f"designs: {name} in {COLUMNS[name][2]} must fit {n} designs of "
-                f"{sections} sections; instead received shape {array.shape}"
-            ) from None
-    if "bore_mm" in arrays and np.any(arrays["bore_mm"] >= arrays["diameter_mm"]):
-        raise InputError(
-            "designs: every bore_mm in mm must be below its diameter_mm; instead "
-            "received one that is not"
-        )
-    return arrays
-
-
-def _given(
-    designs: Mapping[str, ArrayLike] | NDArray[np.void], magnet: Magnet | Field | None
-) -> dict[str, Array]:
-    """Return the columns as they are given, their names and values checked."""
-    given = designs.dtype.names if isinstance(designs, np.ndarray) else designs
-    known_kind = isinstance(given, (Mapping, tuple)) or hasattr(given, "columns")
-    if given is None or not known_kind:
-        raise InputError(
-            "designs must be a mapping of columns or a structured array; instead "
-            f"received {shown(designs)}"
-        )
-    names = [str(name) for name in given]
-    sizes = {name for name in names if name in ALL_SIZES} or {"side_mm"}
-    if sizes not in [set(given) for given in SIZES.values()]:
-        raise InputError(
-            "designs must have the sizes of one shape, in mm: side_mm, or width_mm and "
-            "height_mm, or diameter_mm with or without bore_mm; instead received "
-            f"{', '.join(sorted(sizes))}"
-        )
-    wanted = {"length_mm", "E_MPa", "remanence_mT"} | sizes
-    if magnet is None:
-        wanted |= {"flux_mT"}
-    elif waits_for_gap(magnet):
-        wanted |= {"gap_mm"}
-    known = wanted | {"angle_deg"} if magnet is None else wanted
-    if not wanted <= set(names) <= known:
-        raise InputError(
-            f"designs must have the columns {', '.join(sorted(wanted))} in mm, MPa and "
-            f"mT (flux_mT without a magnet, gap_mm if it waits for one); instead "
-            f"received {', '.join(sorted(names))[:200]}"
-        )
-    arrays = {name: column(name, designs[name]) for name in names}
-    if magnet is None:
-        arrays.setdefault("angle_deg", np.array(90.0))
-    return arrays
 
 
 def _solve_chunk(

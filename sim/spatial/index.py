@@ -14,11 +14,13 @@ import numpy as np
 
 from ...core.jit import njit
 from ..magnet.flux import is_uniform
-from .march import COLUMN, STATE, begin, cross, loaded, step, steps_of, workspace
+from ..magnet.jet import JET
+from .across import NEAR, PLACES
+from .march import BLOCK, WIDTH, WORK, H, Z, begin, cross, loaded, pairs_of, step
 
-SPLIT = 3
-"""Steps from one look for focal points to the next: B's smallest part grows with the
-third power of that distance, and must stand out from what a step leaves."""
+SPLIT = 2
+"""Pairs of steps from one look for focal points to the next: B's smallest part grows
+with the third power of that distance, and must stand out from what a step leaves."""
 
 
 @njit(cache=True)
@@ -60,22 +62,18 @@ def solve6(A, x):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def matrix(Z, A):  # type: ignore[no-untyped-def]
-    """Copy turn and shift at the root by the tip's turn (and shift) into `A`.
+def matrix(w, z, A):  # type: ignore[no-untyped-def]
+    """Copy turn and shift by the tip's turn (and shift) from `z` on into `A`.
 
     In a uniform field, where a shift of the tip shifts the whole rod and no more, `A`
     is (3, 3), or the shifts are filled in.
     """
     n = A.shape[0]
-    known = min(n, Z.shape[1])
     for a in range(n):
-        for i in range(n):
-            A[i, a] = 1.0 if i == a else 0.0
-    for a in range(known):
         for i in range(3):
-            A[i, a] = Z[i, a]
+            A[i, a] = w[z + 6 * i + a]
             if n > 3:
-                A[3 + i, a] = Z[6 + i, a]
+                A[3 + i, a] = w[z + 36 + 6 * i + a]
 
 
 @njit(cache=True)
@@ -129,42 +127,64 @@ def negatives(S):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _ask(m, w):  # type: ignore[no-untyped-def]
+    """Set the columns that answer, from here on, to the moment and force alone."""
+    if m == 3:
+        for k in range(12):
+            for a in range(3):
+                w[Z + 6 * k + 3 + a] = 0.0
+        for a in range(3):
+            w[Z + 18 + 7 * a + 3] = -1.0
+        return
+    w[Z + BLOCK : Z + 2 * BLOCK] = 0.0
+    for a in range(3):
+        w[Z + BLOCK + 18 + 7 * a] = -1.0
+        w[Z + BLOCK + 54 + 7 * a + 3] = -1.0
+
+
+@njit(cache=True)
+def _focal_points(m, w, X0, X1, B, S):  # type: ignore[no-untyped-def]
+    """Count those between the look that left X_0 and the columns of now, or -1."""
+    matrix(w, Z, X1)
+    matrix(w, Z + 3 if m == 3 else Z + BLOCK, B)
+    if not solve6(X1, B):
+        return -1
+    S[:] = 0.0
+    for a in range(m):
+        for c in range(m):
+            for k in range(m):
+                S[a, c] += X0[a, k] * B[k, c]
+    for a in range(m):
+        for c in range(a):
+            S[a, c] = S[c, a] = 0.5 * (S[a, c] + S[c, a])
+    return negatives(S)
+
+
+@njit(cache=True)
 def morse_index(rod, field, load, n, R, r):  # type: ignore[no-untyped-def]
     """Count the focal points between tip and root: the unstable directions."""
     m = unknowns(field)
-    y, Z = np.zeros(STATE), np.zeros((COLUMN, 2 * m))
-    K, KZ, ys, Zs, b, b2, p = workspace(2 * m, rod.shape[1])
-    begin(rod, field, load, R, r, y, Z, b)
+    blocks, solid = m // 3, rod.shape[1] > WIDTH
+    table = np.zeros((0, PLACES, NEAR))
+    w, jet, b, c = np.zeros(WORK), np.zeros(JET), np.zeros(12), np.zeros(12)
     X0, X1, B, S = (
         np.zeros((m, m)), np.zeros((m, m)), np.zeros((m, m)), np.zeros((m, m)),
     )  # fmt: skip
     index = 0
+    begin(rod, field, load, R, r, 1, w, b)
     for i in range(rod.shape[0]):
-        loaded(rod, i, load, p)
-        count = steps_of(rod, i, n / SPLIT)
-        h = rod[i, 0] / count
+        loaded(rod, i, load, w)
+        count = pairs_of(rod, i, n / SPLIT)
+        h = rod[i, H] / (2 * SPLIT * count)
         for _ in range(count):
-            matrix(Z, X0)
-            Z[:, m:] = 0.0
-            for a in range(3):
-                Z[3 + a, m + a] = -1.0
-                if m > 3:
-                    Z[9 + a, 9 + a] = -1.0
-            for _ in range(SPLIT):
-                step(h / SPLIT, p, field, y, Z, K, KZ, ys, Zs, b, b2)
-            matrix(Z, X1)
-            matrix(Z[:, m:], B)
-            if not solve6(X1, B):
+            matrix(w, Z, X0)
+            _ask(m, w)
+            for _ in range(2 * SPLIT):
+                step(h, field, solid, table, 0, 0, blocks, w, jet, b, c)
+            more = _focal_points(m, w, X0, X1, B, S)
+            if more < 0:
                 return -1
-            S[:] = 0.0
-            for a in range(m):
-                for c in range(m):
-                    for k in range(m):
-                        S[a, c] += X0[a, k] * B[k, c]
-            for a in range(m):
-                for c in range(a):
-                    S[a, c] = S[c, a] = 0.5 * (S[a, c] + S[c, a])
-            index += negatives(S)
+            index += more
         if i + 1 < rod.shape[0]:
-            cross(rod, field, load, i, y, Z[:, :m], b)
+            cross(rod, field, load, i, 1, w, b)
     return index

@@ -11,24 +11,20 @@ import numpy as np
 
 from ...core.jit import njit
 from ..magnet.flux import blocked
-from .index import matrix, morse_index, solve6, unknowns
-from .march import (  # fmt: skip
-    COLUMN,
-    STATE,
-    begin,
-    cross,
-    loaded,
-    march,
-    step,
-    workspace,
-)
+from ..magnet.jet import JET
+from .across import NEAR, PLACES
+from .curve import KEPT, march, runs_along, shape, tabulate
+from .index import matrix, morse_index, solve6
+from .march import K1, K3, WORK, Y, Z, all_pairs
 
 CONVERGED = 1e-9
 """Correction after which the next, by the matrix kept, is rounding."""
-NEAR = 1e-4
+CLOSE = 1e-3
 """Correction after which the coarse steps have done their part."""
 COARSE = 0.5
 """Share of the steps that brings Newton near, and is enough for its matrix."""
+STILL = 3e-5
+"""Move of the tip over which the field near a curve, to second order, is exact."""
 CHORD = 1e-2
 """Correction after which the matrix is kept."""
 MIN_LOAD_STEP = 1e-6
@@ -53,12 +49,12 @@ def _turn(Ra, Rb, x):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _miss(y, Rc, x):  # type: ignore[no-untyped-def]
+def _miss(w, Rc, x):  # type: ignore[no-untyped-def]
     """Write minus the root's turn and shift into `x`; return the trace."""
-    trace = _turn(Rc, y[:9].reshape(3, 3), x)
+    trace = _turn(Rc, w[Y : Y + 9].reshape(3, 3), x)
     for i in range(3):
         x[i, 0] = -x[i, 0]
-        x[3 + i, 0] = -y[12 + i]
+        x[3 + i, 0] = -w[Y + 12 + i]
     return trace
 
 
@@ -83,23 +79,70 @@ def _move(R, r, x):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _unloaded(rod, field, n, Rc, R, r, y, none, bare):  # type: ignore[no-untyped-def]
-    """Set the tip's pose (R, r) to that of the unloaded rod, whatever its rest shape.
+def room(rod, field, n):  # type: ignore[no-untyped-def]
+    """Return what marches of up to n steps work in and leave.
+
+    Work space of `march` (four arrays); the curve of the last march, the table of the
+    field along a curve; how many steps each of these two has (0: there is none), and
+    how far the tip has moved since.
+    """
+    pairs = all_pairs(rod, n)
+    along = pairs if runs_along(rod, field) else 0
+    work = np.zeros(WORK), np.zeros(JET), np.zeros(12), np.zeros(12)
+    curve = np.zeros((pairs, 3, KEPT))
+    return work, curve, np.zeros((along, PLACES, NEAR)), np.zeros(3)
+
+
+@njit(cache=True)
+def run(rod, field, load, n, R, r, columns, moved, held):  # type: ignore[no-untyped-def]
+    """March in the field along the curve of the march before, and keep the curve.
+
+    The table of that field is used again where the tip has hardly `moved` since.
+    """
+    work, curve, table, known = held
+    blocks = 1 if columns else 0
+    if table.shape[0] > 0 and known[0] > 0.0:
+        known[2] += moved
+        if known[2] > STILL or known[1] != n:
+            tabulate(rod, field, known[0], curve, n, table)
+            known[1] = n
+            known[2] = moved
+    else:
+        table = table[:0]
+    known[0] = n
+    return march(rod, field, load, n, R, r, blocks, table, curve, *work)
+
+
+@njit(cache=True)
+def unloaded(rod, field, n, Rc, R, r, held):  # type: ignore[no-untyped-def]
+    """Set the tip's pose (R, r) to that of the unloaded rod, and keep its curve.
 
     Without load a march from any pose gives the rod but for a rigid motion.
     """
+    work, _, table, known = held
     R[:] = Rc
-    r[:] = 0.0
-    march(rod, field, 0.0, n, R, r, y, none, bare)
+    r[:] = Rc[:, 2]
+    if np.any(rod[:, K1 : K3 + 1]):
+        r[:] = 0.0
+        run(rod, field, 0.0, n, R, r, False, math.inf, held)
+        _carry(work[0], Rc, R, r)
+    if table.shape[0] > 0:
+        known[0] = 0.0
+        run(rod, field, 0.0, n, R, r, False, math.inf, held)
+
+
+@njit(cache=True)
+def _carry(w, Rc, R, r):  # type: ignore[no-untyped-def]
+    """Carry a rod from a tip at the origin to the clamp, by its root's state."""
     for i in range(3):
         for j in range(3):
             R[i, j] = 0.0
             for a in range(3):
                 for b in range(3):
-                    R[i, j] += Rc[i, a] * y[3 * b + a] * Rc[b, j]
+                    R[i, j] += Rc[i, a] * w[Y + 3 * b + a] * Rc[b, j]
         for a in range(3):
             for b in range(3):
-                r[i] -= Rc[i, a] * y[3 * b + a] * y[12 + b]
+                r[i] -= Rc[i, a] * w[Y + 3 * b + a] * w[Y + 12 + b]
     for a in range(3):  # what the march's steps have bent of the axes
         for b in range(a):
             R[:, a] -= (R[:, a] * R[:, b]).sum() * R[:, b]
@@ -107,41 +150,50 @@ def _unloaded(rod, field, n, Rc, R, r, y, none, bare):  # type: ignore[no-untype
 
 
 @njit(cache=True)
-def newton(rod, field, load, n, Rc, R, r, first, y, Z, J, none, work, bare):  # type: ignore[no-untyped-def]
-    """Iterate the tip's pose (R, r); False if the corrections do not contract.
+def newton(rod, field, load, n, Rc, R, r, first, J, held):  # type: ignore[no-untyped-def]
+    """Iterate the tip's pose (R, r) until the corrections are rounding.
 
     Coarse steps bring it near and give the matrix, which stays in `J`; then n steps.
+
+    Returns
+    -------
+    tuple of bool
+        Whether it converged; whether at the first and at the last matrix no direction
+        is unstable for sure.
     """
     A, x = np.zeros((6, 6)), np.zeros((6, 1))
-    before = math.inf
+    w = held[0][0]
+    before = size = math.inf
     fine = False
+    start = end = False
     for k in range(24):
         if blocked(field, r[0], r[1], r[2], 0.0):
-            return False
-        steps = n if fine else COARSE * n
+            return False, start, end
         if before > CHORD:
-            march(rod, field, load, steps, R, r, y, Z, work)
-            matrix(Z, J)
+            end = run(rod, field, load, COARSE * n, R, r, True, size, held)
+            start = end if k == 0 else start
+            matrix(w, Z, J)
         else:
-            march(rod, field, load, steps, R, r, y, none, bare)
-        trace = _miss(y, Rc, x)
+            steps = n if fine else COARSE * n
+            run(rod, field, load, steps, R, r, False, size, held)
+        trace = _miss(w, Rc, x)
         A[:] = J
         if trace < 1.0 or not solve6(A, x):
-            return False
+            return False, start, end
         size = _move(R, r, x)
         if not size < first or (k > 0 and size > max(0.25 * before, CONVERGED)):
-            return False
+            return False, start, end
         if fine and size < CONVERGED:
-            return True
+            return True, start, end
         before = size
-        if not fine and size < NEAR:
+        if not fine and size < CLOSE:
             fine = True
             before = CHORD
-    return False
+    return False, start, end
 
 
 @njit(cache=True)
-def follow(rod, field, n, Rc, R, r, y, Z, J, none, work, bare):  # type: ignore[no-untyped-def]
+def follow(rod, field, n, Rc, R, r, J, held):  # type: ignore[no-untyped-def]
     """Follow the equilibrium from no load, at (R, r), to full load.
 
     Returns the Morse index and the load reached.
@@ -161,10 +213,13 @@ def follow(rod, field, n, Rc, R, r, y, Z, J, none, work, bare):  # type: ignore[
         Rb[:], rb[:] = R, r
         x[:] = jump * secant
         there = -1
-        if _move(R, r, x) < LONGEST and newton(
-            rod, field, ahead, n, Rc, R, r, 0.1, y, Z, J, none, work, bare
-        ):
-            there = morse_index(rod, field, ahead, COARSE * n, R, r)
+        if _move(R, r, x) < LONGEST:
+            held[3][0] = 0.0
+            found, _, sure = newton(rod, field, ahead, n, Rc, R, r, 0.1, J, held)
+            if found and sure:
+                there = 0
+            elif found:
+                there = morse_index(rod, field, ahead, COARSE * n, R, r)
         if there == index or (there >= 0 and jump < SURE):
             _turn(Rb, R, secant)
             secant[3:, 0] = r - rb
@@ -180,66 +235,48 @@ def follow(rod, field, n, Rc, R, r, y, Z, J, none, work, bare):  # type: ignore[
 
 
 @njit(cache=True)
-def solve_pose(rod, field, n, Rc, R, r):  # type: ignore[no-untyped-def]
-    """Find the tip's pose (R, r) at full load.
+def solve_pose(rod, field, n, Rc, R, r, held):  # type: ignore[no-untyped-def]
+    """Find the tip's pose (R, r) at full load, by n steps and once by 2 n.
 
     Newton from the unloaded rod is believed where it must lead to the branch from zero
     load (see `planar`): no direction is unstable there under the full load.
+
+    Parameters
+    ----------
+    held : tuple
+        Of `room`, for 2 n steps.
 
     Returns
     -------
     tuple
         Morse index (-1: no equilibrium), load reached, error (dimensionless).
     """
-    columns = unknowns(field)
-    y, Z, none = np.zeros(STATE), np.zeros((COLUMN, columns)), np.zeros((COLUMN, 0))
-    work, bare = workspace(columns, rod.shape[1]), workspace(0, rod.shape[1])
     J, x = np.zeros((6, 6)), np.zeros((6, 1))
-    _unloaded(rod, field, n, Rc, R, r, y, none, bare)
+    coarse = COARSE * n
+    unloaded(rod, field, coarse, Rc, R, r, held)
     R0, r0 = R.copy(), r.copy()
-    index = morse_index(rod, field, 1.0, COARSE * n, R, r)
-    if index == 0:
-        index = -1
-        if newton(rod, field, 1.0, n, Rc, R, r, 1.0, y, Z, J, none, work, bare):
-            index = morse_index(rod, field, 1.0, COARSE * n, R, r)
+    index = -1
+    found, start, end = newton(rod, field, 1.0, n, Rc, R, r, 1.0, J, held)
+    if found and (start or morse_index(rod, field, 1.0, coarse, R0, r0) == 0):
+        index = 0 if end else morse_index(rod, field, 1.0, coarse, R, r)
     if index != 0:
         R[:], r[:] = R0, r0
-        index, load = follow(rod, field, n, Rc, R, r, y, Z, J, none, work, bare)
+        index, load = follow(rod, field, n, Rc, R, r, J, held)
         if load < 1.0:
             return -1, load, 0.0
-    march(rod, field, 1.0, 2.0 * n, R, r, y, none, bare)
-    _miss(y, Rc, x)
+    run(rod, field, 1.0, 2.0 * n, R, r, False, math.inf, held)
+    _miss(held[0][0], Rc, x)
     error = np.sum(np.abs(x))
     solve6(J, x)
     return index, 1.0, error + _move(R, r, x) + 1e-15 * n
 
 
 @njit(cache=True)
-def shape(rod, field, n, R, r, s, out):  # type: ignore[no-untyped-def]
-    """Fill `out` (m, 18) with the state at the ascending stations `s`, root to tip."""
-    y, Z = np.zeros(STATE), np.zeros((COLUMN, 0))
-    K, KZ, ys, Zs, b, b2, p = workspace(0, rod.shape[1])
-    begin(rod, field, 1.0, R, r, y, Z, b)
-    k = s.shape[0] - 1
-    here = 0.0
-    for i in range(rod.shape[0]):
-        loaded(rod, i, 1.0, p)
-        last = i + 1 == rod.shape[0]
-        end = 1.0 if last else here + rod[i, 0]
-        while True:
-            while k >= 0 and 1.0 - s[k] <= here + 1e-14:
-                out[k] = y
-                k -= 1
-            if here >= end - 1e-14:
-                break
-            goal = end if k < 0 else min(end, max(1.0 - s[k], here))
-            count = max(1, math.ceil(n * (goal - here)))
-            for _ in range(count):
-                step((goal - here) / count, p, field, y, Z, K, KZ, ys, Zs, b, b2)
-            here = goal
-        here = end
-        if not last:
-            cross(rod, field, 1.0, i, y, Z, b)
-    while k >= 0:
-        out[k] = y
-        k -= 1
+def solve_rod(rod, field, n, Rc, R, r, s, out):  # type: ignore[no-untyped-def]
+    """Find the pose as `solve_pose`, and fill `out` (m, 18) with states at `s`."""
+    held = room(rod, field, 2.0 * n)
+    index, load, error = solve_pose(rod, field, n, Rc, R, r, held)
+    if index >= 0:
+        run(rod, field, 1.0, 2.0 * n, R, r, False, 0.0, held)
+        shape(rod, 2.0 * n, held[1], s, out)
+    return index, load, error

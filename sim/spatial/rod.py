@@ -13,7 +13,7 @@ from ...core.cross_section import torsion_constant_mm4
 from ...core.errors import InputError
 from ...core.sources import FLUX_LIMIT_T
 from ...core.specimen import Specimen, parts
-from ...core.units import MU0
+from ...core.units import MU0, rad_from_deg
 from ..fields import Support
 from .march import AXIAL, C1, C3, K1, K3, MU1, MU2, WIDTH, WX, WZ, H  # fmt: skip
 
@@ -152,6 +152,13 @@ class SpatialRod:
             ),
             density_kg_m3=specimen.density_kg_m3,
         )  # fmt: skip
+
+
+def clamp_of(support: Support) -> Array:
+    """Return the clamp as the kernels take it: the directors there as columns."""
+    angle = rad_from_deg(support.clamp_angle_deg)
+    cos, sin = math.cos(angle), math.sin(angle)
+    return np.array([[-sin, 0.0, cos], [cos, 0.0, sin], [0.0, 1.0, 0.0]])
 
 
 def rod_table(rod: SpatialRod, support: Support) -> Array:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -23,7 +23,7 @@ from ...core.errors import InputError, SolverError
 from ...core.jit import plain_first
 from ...core.sources import FLUX_LIMIT_T
 from ...core.specimen import Specimen
-from ...core.units import mT_from_T, rad_from_deg
+from ...core.units import mT_from_T
 from ..fields import (
     PULLED_IN,
     STABLE,
@@ -39,26 +39,21 @@ from ..planar.contact import load_before_touching, touches
 from ..scaling import MOST_POINTS, field_array, stations
 from ..solution import Solution
 from .law import axis
-from .march import AXIAL, C1, C3, K1, K3, MU1, MU2, WX, WY, WZ, H
+from .march import AXIAL, K1, K3, MU1, MU2, WX, WY, WZ, H, loads_on
 from .march import WIDTH as WIDE
-from .newton import shape, solve_pose
-from .rod import SpatialRod, SpatialSection, Vector, rod_table
+from .newton import solve_rod
+from .rod import SpatialRod, SpatialSection, Vector, clamp_of, rod_table
+from .rows import REACH_LIMIT, TURN_LIMIT
 
 __all__ = ["SpatialRod", "SpatialSection", "SpatialSolution", "solve_spatial"]
 
 Array = NDArray[np.float64]
-
-REACH_LIMIT = 30.0
-"""Largest sum of h sqrt(P / EI): beyond, a tip's pose no longer fixes the root's."""
 
 LOADS = [AXIAL, MU1, MU2, WX, WY, WZ]
 """Columns of the rod's table that are loads."""
 
 PLACE = [12, 13, 14, 2, 5, 8]
 """Position and tangent among a station's numbers."""
-
-TURN_LIMIT = 300.0
-"""Largest turn of the unloaded rod, in rad."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,7 +140,7 @@ class SpatialSolution:
         return "\n".join([names, *rows]) + "\n"
 
 
-@plain_first(solve_pose)
+@plain_first(solve_rod)
 def solve_spatial(
     rod: SpatialRod | Specimen,
     field: Field | Sequence[float],
@@ -208,11 +203,8 @@ def solve_table(
     field, support, points
         As of `solve_spatial`.
     """
-    L = length_mm
+    L, clamp = length_mm, clamp_of(support)
     flux = _flux_array(field, L)
-    angle = rad_from_deg(support.clamp_angle_deg)
-    cos, sin = math.cos(angle), math.sin(angle)
-    clamp = np.array([[-sin, 0.0, cos], [cos, 0.0, sin], [0.0, 1.0, 0.0]])
     s = stations(points)
     unloaded = _unloaded(table, clamp, s)
     if flux[0] != UNIFORM and touches(flux, margin, s, unloaded):
@@ -234,20 +226,29 @@ def solve_table(
     if not _is_vector(field):
         x, y, z = states[:, 12:15].T
         refuse_outside(as_field(field), x, y, L, z)
-    return _solution(table, L, unit_Nmm * 1e-3, flux, s, states, index, error)
+    solution = _solution(L, unit_Nmm * 1e-3, flux, s, states, index, error)
+    if table.shape[1] > WIDE:
+        joints = np.cumsum(table[::-1, H])[:-1]
+        rows = table[::-1][np.searchsorted(joints, s, side="right")]
+        directors, curvature = np.empty((points, 3, 3)), np.empty((points, 3))
+        axis(rows, states[:, :18], directors, curvature)
+        return replace(solution, directors=directors, curvature_per_mm=curvature / L)
+    return solution
 
 
 def _unloaded(table: Array, clamp: Array, s: Array) -> Array:
     """Return positions and tangents of the unloaded rod, shape (n, 6)."""
     direction = clamp[:, 2]
-    if not np.any(table[:, K1 : K3 + 1]):
-        return np.hstack([np.outer(s, direction), np.tile(direction, (len(s), 1))])
+    if not table[:, K1 : K3 + 1].any():
+        line = np.empty((len(s), 6))
+        line[:, :3] = s[:, None] * direction
+        line[:, 3:] = direction
+        return line
     bare, nothing = table.copy(), np.zeros(WIDTH)
     bare[:, LOADS] = 0.0
     n = _steps(bare, nothing, direction)
-    R, r, states = np.empty((3, 3)), np.empty(3), np.empty((len(s), 18))
-    solve_pose(bare, nothing, n, clamp, R, r)
-    shape(bare, nothing, 2 * n, R, r, s, states)
+    R, r, states = np.empty((3, 3)), np.empty(3), np.empty((len(s), 21))
+    solve_rod(bare, nothing, n, clamp, R, r, s, states)
     return states[:, PLACE]
 
 
@@ -256,12 +257,11 @@ def _equilibrium(
 ) -> tuple[int, float, float, Array]:
     """Return Morse index (-1: none clear of the magnet), load, error and states."""
     R, r = np.empty((3, 3)), np.empty(3)
-    index, load, error = solve_pose(table, flux, n, clamp, R, r)
-    states = np.empty((len(s), 18))
-    if index >= 0:
-        shape(table, flux, 2 * n, R, r, s, states)
-        if touches(flux, margin, s, states[:, PLACE]):
-            index = -1
+    states = np.empty((len(s), 21))
+    index, load, error = solve_rod(table, flux, n, clamp, R, r, s, states)
+    near = index >= 0 and flux[0] != UNIFORM
+    if near and touches(flux, margin, s, states[:, PLACE]):
+        index = -1
     return index, load, error, states
 
 
@@ -298,20 +298,13 @@ def _is_vector(field: Any) -> bool:
 
 def _steps(table: Array, flux: Array, tip: Array) -> float:
     """Return steps per length of the rod; refuse loads beyond the march's reach."""
-    b = np.zeros(12)
-    flux_at(flux, tip[0], tip[1], tip[2], b)
-    size = float(np.linalg.norm(b[:3]))
-    load = np.abs(table[:, AXIAL : MU1 + 2]).sum(axis=1).max() * size
-    load += float(np.linalg.norm(table[:, WX : WZ + 1], axis=1) @ table[:, H])
-    soft = table[:, C1 : C3 + 1].max(axis=1)
-    reach = float(table[:, H] @ np.sqrt(soft * load))
+    reach, turns = loads_on(table, flux, tip)
     if reach > REACH_LIMIT:
         raise InputError(
             f"the load on the rod must be below {REACH_LIMIT**2:g} times its stiffness "
             f"EI / L^2; instead received {reach**2:.3g} times: check the units of "
             "E_MPa, remanence_mT and flux"
         )
-    turns = float(np.linalg.norm(table[:, K1 : K3 + 1], axis=1) @ table[:, H])
     if turns > TURN_LIMIT:
         raise InputError(
             "rest_curvature_per_mm must turn the whole rod by less than "
@@ -337,23 +330,15 @@ def _flux_mT(flux: Array, point: Array) -> Vector:
 
 
 def _solution(
-    table: Array, L: float, unit_Nm: float, flux: Array, s: Array, states: Array,
-    index: int, error: float,
+    L: float, unit_Nm: float, flux: Array, s: Array, states: Array, index: int,
+    error: float,
 ) -> SpatialSolution:  # fmt: skip
-    directors = states[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1)
-    moment = directors[0].T @ states[0, 9:12] * unit_Nm
-    joints = np.cumsum(table[::-1, H])[:-1]
-    row = table[::-1][np.searchsorted(joints, s, side="right")]
-    if table.shape[1] > WIDE:
-        directors, curvature = np.empty((len(s), 3, 3)), np.empty((len(s), 3))
-        axis(row, states, directors, curvature)
-    else:
-        curvature = states[:, 9:12] * row[:, C1 : C3 + 1] + row[:, K1 : K3 + 1]
+    moment = states[0, :9].reshape(3, 3) @ states[0, 9:12] * unit_Nm
     return SpatialSolution(
         s_mm=s * L,
         r_mm=states[:, 12:15] * L,
-        directors=directors,
-        curvature_per_mm=curvature / L,
+        directors=states[:, :9].reshape(-1, 3, 3).transpose(0, 2, 1),
+        curvature_per_mm=states[:, 18:] / L,
         status=STABLE if index == 0 else UNSTABLE,
         morse_index=index,
         error_mm=error * L,
