@@ -196,8 +196,9 @@ def _solid_slopes(k, blocks, w):  # type: ignore[no-untyped-def]
 def step(h, field, solid, table, pair, half, blocks, w, jet, b, c):  # type: ignore[no-untyped-def]
     """Advance the state, and the first `blocks` blocks of columns, by `h`.
 
-    The rod is a plain one or a `solid`. It is the first or second half of a pair of steps, whose field is in `table`
-    (`spatial.curve.tabulate`), or looked up where that is empty.
+    The rod is a plain one or a `solid`. The step is the first or second half of a pair,
+    whose field is in `table` (`spatial.curve.tabulate`), or looked up where that is
+    empty.
     """
     mu1, mu2 = w[MU1], w[MU2]
     tilted = mu1 != 0.0 or mu2 != 0.0

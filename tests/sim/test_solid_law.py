@@ -10,8 +10,8 @@ from magbend.sim import Cuboid, Support, Uniform
 from magbend.sim.fields import as_field
 from magbend.sim.scaling import field_array
 from magbend.sim.spatial import law
-from magbend.sim.spatial.march import COLUMN, STATE, march, workspace
-from magbend.sim.spatial.newton import solve_pose
+from magbend.sim.spatial.march import BLOCK, STATE, Y, Z
+from magbend.sim.spatial.newton import room, run, solve_pose
 from magbend.sim.spatial.rod import SpatialRod, rod_table
 
 ROD = Specimen(
@@ -45,9 +45,10 @@ def table(*, strength: float = 1.0) -> np.ndarray:
 
 
 def marched(rod: np.ndarray, R: np.ndarray, r: np.ndarray) -> tuple:
-    y, Z = np.zeros(STATE), np.zeros((COLUMN, 6))
-    march(rod, FIELD, 1.0, 40.0, R, r, y, Z, workspace(6, rod.shape[1]))
-    return y, Z
+    held = room(rod, FIELD, 40.0)
+    run(rod, FIELD, 1.0, 40.0, R, r, True, np.inf, held)
+    w = held[0][0]
+    return w[Y : Y + STATE].copy(), w[Z : Z + BLOCK].reshape(12, 6).copy()
 
 
 def pose() -> tuple[np.ndarray, np.ndarray]:
@@ -57,7 +58,7 @@ def pose() -> tuple[np.ndarray, np.ndarray]:
 
 def test_columns_are_the_derivatives_of_the_march() -> None:
     rod, (R, r) = table(), pose()
-    _, Z = marched(rod, R, r)
+    _, columns = marched(rod, R, r)
     h = 1e-6
     for a in range(6):
         ends = []
@@ -71,7 +72,7 @@ def test_columns_are_the_derivatives_of_the_march() -> None:
                 moved[a - 3] += sign * h
             ends.append(marched(rod, turned, moved)[0])
         slope = (ends[0] - ends[1]) / (2.0 * h)
-        assert slope[9:] == pytest.approx(Z[3:, a], rel=1e-6, abs=1e-6)
+        assert slope[9:] == pytest.approx(columns[3:, a], rel=1e-6, abs=1e-6)
 
 
 def test_without_its_terms_the_law_is_the_plain_rods() -> None:
@@ -79,11 +80,13 @@ def test_without_its_terms_the_law_is_the_plain_rods() -> None:
     poses = []
     for rod in (table(strength=0.0), table(strength=0.0)[:, :13].copy()):
         R, r = np.empty((3, 3)), np.empty(3)
-        assert solve_pose(rod, FIELD, 25.0, clamp, R, r)[0] == 0
+        held = room(rod, FIELD, 50.0)
+        assert solve_pose(rod, FIELD, 25.0, clamp, R, r, held)[0] == 0
         poses.append(np.append(R, r))
     assert np.abs(poses[0] - poses[1]).max() < 1e-9
     R, r = np.empty((3, 3)), np.empty(3)
-    assert solve_pose(table(), FIELD, 25.0, clamp, R, r)[0] == 0
+    held = room(table(), FIELD, 50.0)
+    assert solve_pose(table(), FIELD, 25.0, clamp, R, r, held)[0] == 0
     assert np.abs(np.append(R, r) - poses[1]).max() > 1e-4
 
 
@@ -114,8 +117,8 @@ def test_a_face_in_a_uniform_field_feels_a_mere_force() -> None:
     field = field_array(
         as_field(Uniform(flux_mT=20.0, angle_deg=60.0, elevation_deg=30.0)), 25.0
     )
-    y, Z, (R, r) = np.zeros(STATE), np.zeros((COLUMN, 0)), pose()
+    y, none, (R, r) = np.zeros(STATE), np.zeros((12, 0)), pose()
     y[:9], y[12:15] = R.ravel(), r
-    law.face_load(field, 7.0, table()[0], y, Z, np.zeros(12))
+    law.face_load(field, 7.0, table()[0], y, none, np.zeros(12))
     assert y[9:12] == pytest.approx(np.zeros(3), abs=1e-15)
     assert y[15:] == pytest.approx(7.0 * field[1:4])
