@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from .magnet.flux import distance_at
 from .planar.march import M
 from .planar.near import settle
-from .planar.solver import OK_UNSTABLE, ORDER, STEP, solve_planar
+from .planar.outcomes import OK_UNSTABLE
+from .planar.solver import ORDER, STEP, solve_planar
 from .scaling import stations
 from .solution import Ending
 

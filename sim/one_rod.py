@@ -25,7 +25,8 @@ from .fields import (
     check_case,
     refuse_outside,
 )
-from .planar.solver import GONE, ORDER, STEP, failure, solve_planar, solve_rows
+from .planar.outcomes import GONE
+from .planar.solver import ORDER, STEP, failure, solve_planar, solve_rows
 from .planar.swing import swing_index
 from .scaling import MOST_POINTS, field_array, rod_array, stations, stiffness_Nmm2
 from .solution import Solution
@@ -144,6 +145,8 @@ def _holds(
     specimen: Specimen, support: Support, rod: Array, flux: Array, tip: Array
 ) -> bool | None:
     """Tell whether a rod that is stable in the plane stays in it; None: not known."""
+    if math.isnan(tip[0]):
+        return None
     if specimen.shape != "rectangle":
         return bool(swing_index(rod, flux, tip, STEP) == 0)
     from .spatial.beside import index_in_space

@@ -66,7 +66,7 @@ class Solution(Tabular):
         connected to the unloaded rod: 1 where the full load is reached.
     stable_in_space : bool or None
         Whether the equilibrium also holds against leaving the plane; None where that
-        was not looked at (solid model; a strip under loads beyond 900 EI / L^2) or
+        was not looked at (solid model; loads beyond the reach of the march) or
         there is no equilibrium.
     z_mm : ndarray, shape (n,), or None
         Height of the points of the centreline over the plane, as of a rod that sags;

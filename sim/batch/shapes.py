@@ -17,7 +17,8 @@ from ...core.errors import InputError
 from ...core.magnet import Magnet
 from ...core.specimen import Specimen
 from ..fields import Field, before, outside
-from ..planar.solver import GONE, OK_UNSTABLE, TOUCHES, solve_planar_rows
+from ..planar.outcomes import GONE, OK_UNSTABLE, TOUCHES
+from ..planar.solver import solve_planar_rows
 from ..scaling import (
     MOST_POINTS,
     field_rows,

@@ -20,7 +20,8 @@ from ...core.magnet import Magnet
 from ...core.progress import Progress, silent
 from ..fields import PULLED_IN, STABLE, UNSTABLE, Field, before, outside
 from ..magnet.field import magnet_block
-from ..planar.solver import OK_UNSTABLE, TOUCHES, solve_planar_rows
+from ..planar.outcomes import OK_UNSTABLE, TOUCHES
+from ..planar.solver import solve_planar_rows
 from ..scaling import direction, field_rows, many_rods, uniform_rows
 from .columns import check_magnet, columns_of
 from .lanes import HARD, solve_lanes

@@ -38,12 +38,20 @@ from .follow import (
 )
 from .march import MAX_ORDER, STATE, WX, WY, E, H, M, march
 from .one_sided import first_guess, narrow, one_sided
+from .outcomes import (
+    FAILED,
+    FOLLOW,
+    GONE,
+    OK_STABLE,
+    OK_UNSTABLE,
+    ROUNDING,
+    TOO_STRONG,
+    TOUCHES,
+)
+from .pieces import fill, follow_pieces
 
 Array = NDArray[np.float64]
 
-OK_STABLE, OK_UNSTABLE, GONE, FAILED, TOO_STRONG, TOUCHES, FOLLOW = range(7)
-"""Outcomes: stable, unstable, no equilibrium, no convergence, load beyond `MAX_REACH`,
-undeformed rod touches the magnet; and, inside this module, load to be followed."""
 COARSE, FINE, SHAPE = 0, 1, 2
 """What a march of `_solve_row` is for: to come near, to arrive, and to compare with a
 higher order while the shape is filled."""
@@ -55,8 +63,6 @@ SURE_REACH = 40.0
 too: beyond, the tip no longer fixes the root, and some are refused."""
 ORDER = 16
 STEP = 0.3
-ROUNDING = 2e-14
-"""What rounding may leave of a residual, in lengths of the rod."""
 
 COARSE_ORDER = 8
 COARSE_STEP = 0.6
@@ -297,7 +303,7 @@ def solve_planar_rows(
     out : ndarray, shape (n, 4, m)
         x, y, theta, curvature.
     u : ndarray, shape (n, 4)
-        The unknowns of the march.
+        The unknowns of the march; NaN where the tip does not fix the root.
     """
     n = len(rods)
     found = np.empty((n, 7))
@@ -327,15 +333,31 @@ def _solve_by_following(
     out: Array,
 ) -> None:
     """Solve the one rod of these arrays (as of `solve_rows`) by load continuation."""
-    index, load = follow_load(rods[0], fields[0], clamp, u[0], order, step)
-    if index >= 0:
-        solve_rows(rods, fields, clamp, margins, s, order, step, False, u, found, out)
-    else:
+    rod, field = rods[0], fields[0]
+    pieces = None
+    index, load = follow_load(rod, field, clamp, u[0], order, step)
+    if index < 0 and (index == -2 or _is_unlike(rod)):
+        order, step = max(order, ORDER), min(step, STEP)
+        index, load, pieces = follow_pieces(rod, field, clamp, u[0], order, step)
+    if index < 0:
         found[0, 0] = GONE if index == -1 else FAILED
         found[0, 6] = load
+    else:
+        solve_rows(rods, fields, clamp, margins, s, order, step, False, u, found, out)
+        if found[0, 0] == FAILED and pieces is not None:
+            u[0] = math.nan
+            fill(
+                rod, field, clamp, margins[0], pieces, s[0], order, step, found[0],
+                out[0],
+            )  # fmt: skip
     failed = found[0, 0] == FAILED
-    if failed and reach_there(rods[0], fields[0], u[0]) > SURE_REACH:
+    if failed and reach_there(rod, field, u[0]) > SURE_REACH:
         found[0, 0] = TOO_STRONG
+
+
+def _is_unlike(rod: Array) -> bool:
+    """Tell whether more than the load at the tip bends a rod."""
+    return bool(np.any(rod[:, M] != rod[0, M]) or np.any(rod[:, WX : WY + 1]))
 
 
 def _load_before_touching(end: float, rod: Array, *rest: Any) -> float:
@@ -366,7 +388,7 @@ def solve_planar(
     tuple
         outcome, Morse index, load reached, error, Bx and By at the tip, root moment,
         the shape (4, n): x, y, theta, curvature, and the unknowns (gamma, x_L, y_L,
-        phi) of the march.
+        phi) of the march, NaN where the tip does not fix the root (`planar.pieces`).
     """
     # Not by way of `solve_planar_rows`, which costs a few microseconds more.
     case = rod[None], field[None], clamp, np.array([margin]), s[None], order, step

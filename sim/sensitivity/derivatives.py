@@ -7,6 +7,7 @@ of the same Taylor march per parameter: no differences, no step to choose.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -111,6 +112,11 @@ def sensitivities(
     array = field_array(field, specimen.length_mm)
     clamp = rad_from_deg(support.clamp_angle_deg)
     u = solve_planar(rod, array, clamp, 0.0, stations(2), ORDER, STEP)[-1]
+    if math.isnan(u[0]):
+        raise SolverError(
+            f"the tip of {specimen.name!r} does not fix its root at this load, which "
+            "its derivatives ask for; try a smaller flux_mT or remanence_mT"
+        )
     of_names = [change_of(name, specimen, field, support) for name in names]
     good, out = _derivatives(rod, array, u, of_names, s / specimen.length_mm)
     if not good or not np.all(np.isfinite(out)):

@@ -15,9 +15,10 @@ from ...core.specimen import Specimen
 from ...core.units import mT_from_T, rad_from_deg
 from ..fields import PULLED_IN, STABLE, UNSTABLE, Field, Support, refuse_outside
 from ..magnet.flux import flux_at
+from ..planar.outcomes import GONE
 from ..planar.solver import COARSE_ORDER as START_ORDER
-from ..planar.solver import GONE, failure, solve_planar
 from ..planar.solver import STEP as PLAIN_STEP
+from ..planar.solver import failure, solve_planar
 from ..scaling import field_array, rod_array, stations, stiffness_Nmm2
 from ..solution import Solution
 from .constants import joint_share, solid_constants

@@ -14,6 +14,7 @@ from magbend.sim import (
     MagnetField,
     Rod,
     Section,
+    UniformField,
     sensitivities,
     solve,
     solve_many,
@@ -98,3 +99,31 @@ def test_a_rod_drawn_into_a_strong_coil_is_followed_all_the_way() -> None:
         for E in (5.0001, 4.9999)
     )
     np.testing.assert_allclose(slope, (up - down) / 2e-4, atol=1e-6)
+
+
+def test_no_rod_of_both_signs_is_given_up() -> None:
+    rods = designs(60, 20.0)
+    signs = np.random.default_rng(8).choice([-1.0, 1.0], (60, 3))
+    rods["remanence_mT"] = rods["remanence_mT"][:, None] * signs
+    source = Field(Coil(diameter_mm=80.0, current_A=100.0, turns=300))
+    found = solve_many(rods, magnet=source)
+    assert set(found["outcome"]) <= {0, OUTCOMES.index("pulled in: no equilibrium")}
+
+
+@pytest.mark.parametrize("signs", [(1, -1, -1), (-1, 1, -1)])
+def test_a_rod_whose_tip_does_not_fix_its_root_is_solved_in_pieces(
+    signs: tuple[int, int, int],
+) -> None:
+    parts = zip(signs, (12.0, 25.0, 15.0), (9.0, 6.0, 4.0), strict=True)
+    rod = Rod(
+        name="both signs", side_mm=1.0, remanence_mT=1.0,
+        sections=tuple(
+            Section(length_mm=mm, E_MPa=MPa, remanence_mT=600.0 * sign)
+            for sign, mm, MPa in parts
+        ),
+    )  # fmt: skip
+    field = UniformField(flux_mT=300.0, angle_deg=110.0)
+    found = solve(rod, field)
+    assert found.status == "stable"
+    assert found.error_mm < 1e-6
+    assert verify(rod, field, found, degree=40) < 1e-6
