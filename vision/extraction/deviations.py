@@ -22,18 +22,31 @@ from .root import RootPlace
 
 Array = NDArray[np.float64]
 
-TIP_PX, WIDTH_PX, WIDTH_SHADE = 0.05, 0.03, 0.3
-"""Systematic parts: of an end face whose edge is not straight, and of a width whose
-blur is no Gaussian's; and the share of a shade's pull that is left in a width."""
-END_FACE, SIDE_FACE, PALE_FACE = 0.1, 0.07, 0.5
-"""Doubt of where an end or a side ends whose face is seen, in widths of that face: it
-has another grey value than the top, and one that is not known on a rod that is not
-dark."""
+TIP_BLUR, WIDTH_PX, WIDTH_SHADE = 0.045, 0.055, 0.3
+"""Systematic parts: of an end face whose edge is not straight, in blurs; of a width
+whose blur is no Gaussian's; and the share of a shade's pull that is left in a width."""
+FACE_SEEN, FACE_HIDDEN = 0.17, 0.14
+"""Doubt of where an end is, in widths of its face where the camera sees it (it has
+another grey value than the top); else, where a lower edge is hidden, of that width
+times the tangent of the angle at which it would be seen."""
+SIDE_FACE, PALE_FACE, WIDTH_FACE = 0.07, 0.5, 0.03
+"""Doubt of where a side ends whose face is seen, in widths of that face: on a dark rod,
+one that is not dark, and what of it is left in a dark rod's width."""
+PALE_PX = 0.2
+"""Doubt of a width that is not dark, whatever is seen of its sides."""
+SATURATED = 0.45
+"""Doubt of an edge, in blurs, beside paper that is white: how much more light there was
+is not known. With 1.5 times what makes it white, half level lies 0.43 blurs off."""
+
+
+def is_dark(seen_in: View) -> bool:
+    """Whether a rod is seen dark in plain light, so that its faces' light is known."""
+    return seen_in.sign > 0.0 and seen_in.mix is None
 
 
 def side_face(seen_in: View) -> float:
     """Return the doubt of a side face in the light in which a rod is seen."""
-    return SIDE_FACE if seen_in.sign > 0.0 and seen_in.mix is None else PALE_FACE
+    return SIDE_FACE if is_dark(seen_in) else PALE_FACE
 
 
 def scale_sd(camera: Calibration, rod_height_mm: float) -> float:
@@ -46,7 +59,7 @@ def scale_sd(camera: Calibration, rod_height_mm: float) -> float:
 
 def with_deviations(
     result: Measurement, refined: Refined, root: RootPlace, view: LocalView,
-    camera: Calibration, height_mm: float, faces: float,
+    camera: Calibration, height_mm: float, *, dark: bool,
 ) -> Measurement:  # fmt: skip
     """Return a measurement with its standard deviations.
 
@@ -62,24 +75,33 @@ def with_deviations(
         The camera.
     height_mm : float
         Of the axis above the board's plane.
-    faces : float
-        Doubt of a side face, in its width.
+    dark : bool
+        Whether the rod is seen dark in plain light.
     """
     own = camera.scale_relative_sd
     scale = math.hypot(own if math.isfinite(own) else 0.0, scale_sd(camera, height_mm))
     clamp = root.sd / float(view.along[0])
-    face = END_FACE * abs(float(view.rise_along[-1])) * result.width_mm
-    tip = math.hypot(refined.tip.sigma, TIP_PX, face) / float(view.along[-1])
-    wall = faces * median(np.abs(view.rise_across)) * result.width_mm
-    noise = median(refined.sigma_width) / math.sqrt(max(1.0, _widths(refined)))
-    shade = WIDTH_SHADE * median(refined.shaded)
-    width = math.hypot(noise, WIDTH_PX, shade, wall) / median(view.across)
+    white = SATURATED * refined.saturated * refined.blur
+    rise = float(view.rise_along[-1])
+    seen = rise < 0.0 or not dark
+    face = rise * (FACE_SEEN if seen else FACE_HIDDEN * rise / float(view.along[-1]))
+    tip = math.hypot(
+        refined.tip.sigma, TIP_BLUR * refined.blur, face * result.width_mm, white
+    ) / float(view.along[-1])
+    wall = WIDTH_FACE if dark else PALE_FACE
+    width = math.hypot(
+        median(refined.sigma_width) / math.sqrt(max(1.0, _widths(refined))),
+        WIDTH_PX if dark else PALE_PX,
+        WIDTH_SHADE * median(refined.shaded),
+        wall * median(np.abs(view.rise_across)) * result.width_mm,
+        2.0 * white,
+    ) / median(view.across)
     return replace(
         result,
         length_sd_mm=math.hypot(clamp, tip, scale * result.length_mm),
         width_sd_mm=math.hypot(width, scale * result.width_mm),
         clamp_sd_mm=clamp,
-        tip_sd_mm=_tip_sd_mm(result, clamp, tip, scale),
+        tip_sd_mm=_tip_sd_mm(result, view, clamp, tip, scale, dark=dark),
     )
 
 
@@ -88,17 +110,25 @@ def _widths(refined: Refined) -> float:
 
 
 def _tip_sd_mm(
-    result: Measurement, clamp: float, tip: float, scale: float
-) -> tuple[float, float]:
-    """Return the tip's deviations along x and y of the specimen frame."""
-    across = result.points["sigma_mm"]
+    result: Measurement, view: LocalView, clamp: float, tip: float, scale: float, *,
+    dark: bool,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the tip's deviations along x and y of the specimen frame.
+
+    What side faces shift alike at the root and at the tip moves the frame with the tip.
+    """
+    share = SIDE_FACE if dark else PALE_FACE
+    faces = share * result.width_mm * view.rise_across / view.along
+    own = result.points["sigma_mm"]
+    across = np.sqrt(np.maximum(own**2 - faces**2, 0.0))
+    beside = math.hypot(across[-1], faces[-1] - faces[0])
     end = math.radians(result.tip_angle_deg)
     turn = math.radians(result.clamp_angle_sd_deg)
     x, y = result.tip_mm
     parts = np.array(
         [
             [tip * math.cos(end), tip * math.sin(end)],
-            [across[-1] * math.sin(end), across[-1] * math.cos(end)],
+            [beside * math.sin(end), beside * math.cos(end)],
             [clamp, across[0]],
             [turn * y, turn * x],
             [scale * x, scale * y],

@@ -44,6 +44,9 @@ _BIN_PX = 4.0
 _BINS = 200
 """Stations are averaged over bins before the fit: so far, or so many on a long rod."""
 
+WHITE = 0.97
+"""Light of what is as light as a picture can tell, but for noise."""
+
 ROOT_CLEAR = 0.3
 """Widths next to the clamp that are left out of the fit."""
 
@@ -72,6 +75,8 @@ class Refined:
         Whether its edges wander, as a yarn's.
     blur : float
         Standard deviation of the blur, as its edges show it, px.
+    saturated : float
+        Part of it beside which the paper is white, as far as the picture can tell.
     settled : bool
         Whether the last pass still moved nothing.
     """
@@ -85,6 +90,7 @@ class Refined:
     clamp: ClampLines | None
     rough: bool
     blur: float
+    saturated: float
     settled: bool = True
 
     @property
@@ -174,7 +180,8 @@ def refine(
         fit=replace(fit, curve=curve), shaded=shaded, good=used, width=width,
         sigma_width=sigma_width, tip=replace(tip, s=tip.s - first),
         clamp=None if lines is None else lines.shifted(first), rough=state.rough,
-        blur=state.blur, settled=settled,
+        blur=state.blur,
+        saturated=_saturated(seen) if sign > 0.0 else 0.0, settled=settled,
     )  # fmt: skip
 
 
@@ -210,6 +217,12 @@ def _look(grey: Image, state: State, sign: float, turn: int, *, seeking: bool) -
     state.blur = float(np.clip(blur, 0.3, 0.5 * state.width)) if blur > 0 else 1.0
     state.scatter = _scatter(edges, int(5.0 / step))
     return Seen(s, theta, edges, good)
+
+
+def _saturated(seen: Seen) -> float:
+    """Return the part of the rod beside which the paper is as light as can be."""
+    paper = np.maximum(seen.edges.outer_low, seen.edges.outer_high)[seen.good]
+    return float(np.mean(paper > WHITE))
 
 
 def _scatter(edges: Edges, lag: int) -> float:

@@ -23,9 +23,9 @@ from .setting import UNKNOWN_CLAMP_MM, Setting
 HIDDEN_MM = 0.05
 """What part of the root a clamp of unknown height may hide before that is named."""
 
-LINE_PX, ONE_LINE_PX, BORDER_PX = 0.08, 0.2, 0.3
-"""Standard deviation of a place that two lines tell alike, that one tells and nothing
-checks, and of where a rod enters the picture."""
+LINE_PX, BORDER_PX, CARRIED = 0.065, 0.3, 0.03
+"""Standard deviation of a place that a line tells, and of where a rod enters the
+picture; and of how far a line is carried to the height of the axis, as a share."""
 
 
 _STEP_PX = 20.0
@@ -78,27 +78,35 @@ def root_place(
     if refined.clamp is None:
         return RootPlace(s=0.0, sd=BORDER_PX)
     rise = float(ends.rise_along[0])
+    face, front = refined.clamp.face, refined.clamp.front
     if rise > 0.0:
         hidden = hidden_px(refined, setting, rise) / math.sqrt(3.0)
-        place = _hidden_root(refined, ends, setting)
-        return RootPlace(s=place, sd=math.hypot(ONE_LINE_PX, hidden), hidden=hidden)
-    face, front = refined.clamp.face, refined.clamp.front
+        place, line = _hidden_root(refined, ends, setting), front or face
+        carried = 0.0 if line is None else place - line.s
+        return RootPlace(s=place, sd=_sd(carried, hidden), hidden=hidden)
     seen_at, axis_mm = [], setting.axis_height_mm
     if face is not None:
         seen_at.append(_below(refined, face, axis_mm + 0.5 * side_mm, setting))
     if front is not None:
         seen_at.append(_below(refined, front, 0.0, setting))
     if not seen_at:
-        return RootPlace(s=0.0, sd=ONE_LINE_PX)
-    if len(seen_at) == 1:
-        return RootPlace(s=seen_at[0], sd=ONE_LINE_PX)
-    apart = seen_at[1] - seen_at[0]
+        return RootPlace(s=0.0, sd=BORDER_PX)
+    if face is None or front is None:
+        line = front or face
+        carried = 0.0 if line is None else seen_at[0] - line.s
+        return RootPlace(s=seen_at[0], sd=_sd(carried))
+    apart, carried = seen_at[1] - seen_at[0], seen_at[1] - front.s
     if abs(apart) <= APART_PX:
         place = between(seen_at[0], seen_at[1], refined.clamp)
-        return RootPlace(s=place, sd=math.hypot(LINE_PX, 0.5 * apart), apart=apart)
+        return RootPlace(s=place, sd=_sd(carried, 0.5 * apart), apart=apart)
     if is_face(apart, setting.face_px(refined.fit.curve)):
-        return RootPlace(s=seen_at[1], sd=ONE_LINE_PX)
+        return RootPlace(s=seen_at[1], sd=_sd(carried))
     return RootPlace(s=seen_at[0], sd=0.5 * abs(apart), apart=apart)
+
+
+def _sd(carried: float, other: float = 0.0) -> float:
+    """Return the deviation of a place from lines that were carried so far, px."""
+    return math.hypot(LINE_PX, CARRIED * carried, other)
 
 
 def root_hidden(refined: Refined, setting: Setting) -> bool:

@@ -21,7 +21,7 @@ from ..curve.robust import median
 from ..edge.state import LostError
 from ..find.ground import View
 from ..measurement import Measurement, Pose
-from .deviations import side_face, with_deviations
+from .deviations import is_dark, side_face, with_deviations
 from .refine import Refined
 from .root import RootPlace, root_place
 from .setting import Setting, arc_mm, silhouette
@@ -37,14 +37,15 @@ SAMPLING_PX = 0.002
 SHADE_LEFT = 0.17
 THETA_PX = 0.003
 """Systematic part of a tangent angle, times the width: pixel sampling, as above."""
-DRIFT_SHADE = 0.5
-DRIFT_WALL = 0.02
-DRIFT_REACH = 1.5
-"""Errors that neighbours share: the midline drifts by this share of the shade's pull,
-and of the side wall that is seen, alike over so many widths. They turn the direction at
-the clamp, from which the whole frame hangs."""
-CLAMP_PLACE_PX = 0.2
-"""A clamp whose place is so far off has the direction of another point of the rod."""
+SUPPLE, SUPPLE_FREEDOM = 1.25, 5.0
+"""Factor on the fit's own deviation of the direction at the clamp for a curve of so
+many free numbers, and with the root of more: they were chosen by the same points."""
+TURN_SHADE, TURN_WALL, TURN_PALE_WALL = 0.35, 0.14, 0.4
+"""Shares of the shade's pull, and of the side wall that is seen (on a rod that is not
+dark: its light is not known), by which the midline is off all along, with one sign."""
+DRIFT_SHADE, DRIFT_BENT, DRIFT_WHITE, DRIFT_REACH = 0.15, 0.15, 0.03, 1.5
+"""Errors that neighbours share over so many widths: of the shade's pull; by the angle
+that a rod turns over its width, px; and of the blur where the paper is white."""
 
 POINTS = 121
 """Points of a measured centreline."""
@@ -140,7 +141,7 @@ def _in_frame(
     heading, root = view.heading, told.root
     across = silhouette(view)
     wall = np.abs(view.rise_across) * np.interp(s, grid.s, refined.width) / across
-    own_sd_deg = _clamp_sd_deg(refined, np.interp(grid.s, s, wall), root)
+    own_sd_deg = _clamp_sd_deg(refined, np.interp(grid.s, s, wall), root, seen_in)
     angle_deg, sd_deg, flags = surer_direction(
         told, float(np.degrees(heading[0])), own_sd_deg
     )
@@ -182,20 +183,27 @@ def _in_frame(
         flags=(*flags, *(("clamp_lines_differ",) if root.lines_differ else ())),
     )
     height_mm = setting.axis_height_mm
-    faces = side_face(seen_in)
-    return with_deviations(result, refined, root, view, camera, height_mm, faces)
+    return with_deviations(
+        result, refined, root, view, camera, height_mm, dark=is_dark(seen_in)
+    )
 
 
-def _clamp_sd_deg(refined: Refined, wall: Array, root: RootPlace) -> float:
+def _clamp_sd_deg(
+    refined: Refined, wall: Array, root: RootPlace, seen_in: View
+) -> float:
     """Return the standard deviation of the direction at the clamp.
 
     `wall` is how wide the side wall is seen, px.
     """
     fit, width = refined.fit, float(refined.width[0])
-    drift = np.hypot(DRIFT_SHADE * refined.shaded, DRIFT_WALL * wall)
-    place = root.sd if root.lines_differ else max(CLAMP_PLACE_PX, root.hidden)
+    bent = np.hypot(DRIFT_BENT * fit.curve.kappa * width, DRIFT_SHADE * refined.shaded)
+    white = DRIFT_WHITE * refined.saturated * refined.blur
+    facing = TURN_WALL if is_dark(seen_in) else TURN_PALE_WALL
     parts = (
-        fit.sigma_theta[0], fit.turned(drift, DRIFT_REACH * width),
-        place * fit.curve.kappa[0],
-    )  # fmt: skip
+        SUPPLE * math.sqrt(fit.freedom / SUPPLE_FREEDOM) * fit.sigma_theta[0],
+        fit.turned(np.hypot(bent, white), DRIFT_REACH * width),
+        TURN_SHADE * fit.lever @ refined.shaded,
+        facing * fit.lever @ wall,
+        root.sd * fit.curve.kappa[0],
+    )
     return math.degrees(math.hypot(*parts))

@@ -1,0 +1,64 @@
+"""What is stated of length, tip, width and clamp grows with what makes it unsure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from magbend.vision import Pose, as_photo, extract
+from magbend.vision.synthetic import (
+    GREY,
+    Block,
+    Scene,
+    SceneLight,
+    curve,
+    render_scene,
+    scene_camera,
+)
+
+HEIGHT, SIDE, LENGTH = 0.9, 1.0, 22.0
+CAMERA = scene_camera(size_px=(800, 600), focal_px=3400.0, target_mm=(0.0, 0.0))
+SCENE = Scene(
+    clamp=Block(
+        pose=Pose(x_mm=-12.0, y_mm=-6.0, angle_deg=6.0, height_mm=HEIGHT),
+        width_mm=8.0, colour=GREY,
+    ),
+    centreline=curve("arc", angle_deg=50.0, length_mm=LENGTH), side_mm=SIDE, dust=0,
+)  # fmt: skip
+
+
+def measured(scene, camera=CAMERA):
+    picture = render_scene(scene, camera, np.random.default_rng(3))
+    found = extract(
+        as_photo(picture), camera, rod_height_mm=HEIGHT, clamp_height_mm=4.0
+    )
+    assert found.ok, found.reason
+    return found
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return measured(SCENE)
+
+
+def test_white_paper_hides_how_much_light_there_was(plain):
+    """Half level of what is cut off at white lies inside the rod, by part of a blur."""
+    white = measured(replace(SCENE, light=SceneLight(exposure=2.0)))
+    assert abs(white.width_mm - SIDE) > 3.0 * plain.width_sd_mm
+    assert abs(white.width_mm - SIDE) < 2.0 * white.width_sd_mm
+    assert white.length_sd_mm > 1.5 * plain.length_sd_mm
+
+
+def test_a_blurred_tip_is_known_less_well(plain):
+    blurred = measured(replace(SCENE, light=SceneLight(blur_px=3.0)))
+    assert blurred.length_sd_mm > 1.5 * plain.length_sd_mm
+    assert abs(blurred.length_mm - LENGTH) < 3.0 * blurred.length_sd_mm
+
+
+def test_the_faces_of_a_pale_rod_are_in_doubt(plain):
+    board = replace(SCENE, paper=(0.16, 0.30, 0.10), rod_colour=(0.55, 0.58, 0.60))
+    pale = measured(board)
+    assert pale.width_sd_mm > 2.0 * plain.width_sd_mm
+    assert abs(pale.width_mm - SIDE) < 3.0 * pale.width_sd_mm
