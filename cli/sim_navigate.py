@@ -116,9 +116,9 @@ def _field(
     field: Field = UniformField(flux_mT=0.0, angle_deg=angle_deg)
     if field_mT is not None or file is not None or gap_mm is not None:
         field = field_of(file, gap_mm, field_mT, angle_deg)
-    if elevation_deg and field_mT is None:
-        raise typer.BadParameter("--elevation-deg belongs to --field-mT")
     if elevation_deg:
+        if field_mT is None:
+            raise typer.BadParameter("--elevation-deg belongs to --field-mT")
         field = Field(
             Uniform(flux_mT=field_mT, angle_deg=angle_deg, elevation_deg=elevation_deg)
         )

@@ -68,6 +68,11 @@ class OfCase(Protocol):
         ...
 
     @property
+    def field(self) -> object:
+        """What bends the rod: a field, or a function of the insertion."""
+        ...
+
+    @property
     def length_mm(self) -> float:
         """Unit of lengths, in mm."""
         ...
