@@ -16,14 +16,16 @@ from ..fields import Field, Support, refuse_outside
 from ..scaling import field_array
 from ..spatial.march import MU1, MU2
 from ..spatial.rod import SpatialRod, rod_table
+from ..tube.look import Scene
 from ..tube.mesh import clamp, interpolated, mesh, root_strain, straight, trace
 from ..tube.rod import Rod
-from ..tube.settle import SETTLED, SOFT, Rest, Scene, settle
+from ..tube.rub import Past
+from ..tube.settle import SETTLED, SOFT, Rest, settle
 from ..tube.touch import TIP, Touches
 from ..tube.tube import Tube
 from ..tube.wall import Bore, gaps
 from .passage import Contact, Passage, Step
-from .walk import Walk
+from .walk import EASE, Walk
 
 Array = NDArray[np.float64]
 
@@ -107,6 +109,7 @@ class TubeCase:
     table: Array
     bore: Bore
     start: float
+    friction: float
     elements: int
     tip: None = None
 
@@ -174,7 +177,7 @@ class TubeWalk(Walk[TubeCase, TubeState]):
         return -float(rest.load @ along) - stored
 
     def _read(self, state: TubeState) -> SpatialStep:
-        return read_step(self.case, state)
+        return read_step(self.case, state, self.rubbed)
 
     def _passed(self, before: Step, after: Step) -> list[str]:
         low, high = sorted((_along(before), _along(after)))
@@ -183,6 +186,8 @@ class TubeWalk(Walk[TubeCase, TubeState]):
     def error_mm(self) -> float:
         """Return how far the last shape is from the one on elements half as long."""
         state = self._here()
+        if self.case.friction:
+            return math.nan
         fine = replace(self.case, elements=2 * self.case.elements)
         outcome, new = at_rest(fine, state, state.insertion_mm, SOFT)
         if outcome != SETTLED:
@@ -213,7 +218,10 @@ def at_rest(
         touches = touches.kept(inside)
         touches.s[touches.kind == TIP] = rod.s[-1]
     guess = trace(rod, turn, rod.s)
-    scene = Scene(rod, case.flux(insertion_mm), case.bore, case.half, case.start)
+    scene = Scene(
+        rod=rod, field=case.flux(insertion_mm), tube=case.bore, half=case.half,
+        start=case.start, friction=case.friction, past=_past(case, old, insertion_mm),
+    )  # fmt: skip
     rest = settle(scene, turn, touches, soft)
     moved = trace(rod, rest.turn, rod.s)[:, :3] - guess[:, :3]
     outcome = rest.outcome if rest.stable or rest.outcome != SETTLED else -1
@@ -223,7 +231,18 @@ def at_rest(
         rest=rest,
         moved=float(np.linalg.norm(moved, axis=1).max()),
         energy=rest.energy,
+        rubbed=rest.rubbed,
     )
+
+
+def _past(case: TubeCase, old: TubeState | None, insertion_mm: float) -> Past | None:
+    """Return the step before, for friction."""
+    if old is None:
+        return None
+    shift = (insertion_mm - old.insertion_mm) / case.length_mm
+    along = np.array(case.lumen.direction)
+    ease = max(EASE * abs(shift), 1e-9)
+    return Past(old.rod, old.rest.turn, along, shift, ease)
 
 
 def radius_mm(specimen: Specimen) -> float:
@@ -237,7 +256,7 @@ def radius_mm(specimen: Specimen) -> float:
     )
 
 
-def read_step(case: TubeCase, state: TubeState) -> SpatialStep:
+def read_step(case: TubeCase, state: TubeState, rubbed: float) -> SpatialStep:
     """Return what a user sees of a state."""
     L, unit_N = case.length_mm, case.unit_N
     rod, rest = state.rod, state.rest
@@ -265,7 +284,7 @@ def read_step(case: TubeCase, state: TubeState) -> SpatialStep:
         wall_N=sum(forces),
         most_wall_N=max(forces, default=0.0),
         energy_Nmm=state.energy * unit_N * L,
-        rubbed_Nmm=0.0,
+        rubbed_Nmm=rubbed * unit_N * L,
         tip_mm=tip,
         tip_angle_deg=deg_from_rad(math.acos(max(-1.0, min(1.0, cosine)))),
         contacts=contacts,
@@ -295,7 +314,7 @@ def contacts_of(case: TubeCase, rest: Rest) -> tuple[SpatialContact, ...]:
             z_mm=float(seen.r[k, 2] * L),
             along_mm=float(touches.p[k] * L),
             force_N=float(touches.force[k] * steep[k] * case.unit_N),
-            friction_N=0.0,
+            friction_N=float(case.friction * touches.force[k] * steep[k] * case.unit_N),
         )
         for k in np.argsort(touches.s)
         if touches.force[k] > 0.0
@@ -307,6 +326,7 @@ def tube_case(
     tube: Tube,
     field: Field | Callable[[float], Field],
     support: Support,
+    friction: float,
     elements: int,
 ) -> TubeCase:
     """Return a case, checked.
@@ -332,5 +352,6 @@ def tube_case(
         table=table,
         bore=tube.packed(L),
         start=along_mm / L,
+        friction=friction,
         elements=elements,
     )

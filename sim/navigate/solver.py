@@ -56,8 +56,7 @@ def navigate(
     step_mm : float
         Step of the insertion, in mm; where the rod snaps it is refined by itself.
     friction : float
-        Coefficient of Coulomb friction along the wall; it acts on the rod's axis. 0 in
-        a tube.
+        Coefficient of Coulomb friction along the wall; it acts on the rod's axis.
     support : Support
         Weight, in a planar lumen within the plane; and a factor on the magnetic load.
     push_limit_N : float
@@ -105,8 +104,8 @@ def navigate(
     )  # fmt: skip
     walk: PlanarWalk | TubeWalk
     if isinstance(lumen, Tube):
-        _check_tube(lumen, friction, tip)
-        made = tube_case(specimen, lumen, field, support, elements)
+        _check_tip(lumen, tip)
+        made = tube_case(specimen, lumen, field, support, friction, elements)
         walk = TubeWalk(made, step_mm, limit_N)
     else:
         walk = planar_walk(
@@ -180,13 +179,8 @@ def _limit(push_limit_N: float) -> float:
     return size(finite(push_limit_N, "push_limit_N", "N"), "push_limit_N", "N")
 
 
-def _check_tube(tube: Tube, friction: float, tip: object) -> None:
-    """Refuse what only a planar lumen has."""
-    if friction:
-        raise InputError(
-            f"friction must be 0 in tube {tube.name!r}: only planar lumens have it; "
-            f"instead received {friction:g}"
-        )
+def _check_tip(tube: Tube, tip: object) -> None:
+    """Refuse a held tip, which only a planar lumen has."""
     if tip is not None:
         raise InputError(
             f"tip must be None in tube {tube.name!r}: only planar lumens hold a tip; "

@@ -126,7 +126,7 @@ def _quaternions(rod, turn, s, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _trace(rod, turn, X, s, out):  # type: ignore[no-untyped-def]
+def trace_at(rod, turn, X, s, out):  # type: ignore[no-untyped-def]
     """Fill places, tangents and their derivatives, shape (m, 9)."""
     d, v = np.empty(4), np.empty(4)
     for k in range(s.shape[0]):
@@ -137,7 +137,7 @@ def trace(rod: Rod, turn: Turn, s: Array) -> Array:
     """Return place, tangent and its derivative at arc lengths, shape (m, 9)."""
     X, out = np.empty((len(rod.s), 3)), np.empty((len(s), 9))
     own_energy(rod, np.zeros(4), turn, X)
-    _trace(rod, turn, X, s, out)
+    trace_at(rod, turn, X, s, out)
     return out
 
 
