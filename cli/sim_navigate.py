@@ -68,7 +68,7 @@ def navigate(
 ) -> None:
     """Push a rod through a lumen: planar, or a tube in space.
 
-    With contact, push force and snaps; friction in the plane.
+    With contact, friction, push force and snaps.
 
     Without --field-mT, --magnet or --poses there is no field.
     """

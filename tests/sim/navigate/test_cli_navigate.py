@@ -94,7 +94,6 @@ def test_json_holds_every_step_and_contact():
     [
         (("nowhere.toml", "--gmc", "2"), "there is no such file"),
         ((BEND, "--gmc", "9"), "GMC number must be from 1 to 7"),
-        ((ARCH, "--gmc", "2", "--friction", "0.1"), "friction must be 0 in tube"),
         ((BEND, "--gmc", "2", "--friction", "nan"), "friction must be a finite number"),
     ],
 )

@@ -89,7 +89,8 @@ def test_the_error_falls_with_the_fifth_power_of_the_element():
     assert math.log2(off[0] / off[1]) > 4.5
 
 
-def test_a_bend_in_the_plane_is_the_planar_solvers():
+@pytest.mark.parametrize("mu", [0.0, 0.4])
+def test_a_bend_in_the_plane_is_the_planar_solvers(mu):
     """The middle line is given as points: a spline is not quite arcs and segments."""
     rod, radius = round_rod(28.0, 5.0, remanence_mT=20.0), 12.0
     legs = [(6.0, 0.0), (radius * math.pi / 3.0, 60.0), (20.0, 0.0)]
@@ -106,7 +107,8 @@ def test_a_bend_in_the_plane_is_the_planar_solvers():
     )  # fmt: skip
     field = UniformField(flux_mT=15.0, angle_deg=-40.0)
     planar, space = (
-        navigate(rod, lumen, field, step_mm=2.0, refine=False) for lumen in (bend, tube)
+        navigate(rod, lumen, field, step_mm=1.0, friction=mu, refine=False)
+        for lumen in (bend, tube)
     )
     pairs = [*zip(planar.steps, space.steps, strict=True)]
     most = planar.most("wall_N")
@@ -116,6 +118,7 @@ def test_a_bend_in_the_plane_is_the_planar_solvers():
         assert b.wall_N == pytest.approx(a.wall_N, abs=2e-3 * most)
         assert np.hypot(*(np.array(a.tip_mm) - b.tip_mm[:2])) < 5e-3
         assert abs(b.tip_mm[2]) < 1e-9
+        assert b.rubbed_Nmm == pytest.approx(a.rubbed_Nmm, rel=0.01, abs=1e-9)
 
 
 def chain(rod, length_mm, links, flux_T, wall):
@@ -192,19 +195,60 @@ def test_least_energy_of_a_chain_of_links_comes_to_the_same():
     assert energy == pytest.approx(last.energy_Nmm, rel=2e-3)
 
 
-@pytest.mark.parametrize("tube", [helix(10.0, 20.0, 0.6), [(0, 0, 0), (40, 0, 0)]])
-def test_the_work_of_the_hand_is_stored(tube):
-    lumen = Tube(name="t", points_mm=tube, radius_mm=2.0)
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_the_work_of_the_hand_is_stored_or_rubbed_away(mu):
+    lumen = Tube(name="t", points_mm=helix(10.0, 20.0, 0.6), radius_mm=2.0)
     lost = []
     for step_mm in (1.0, 0.5):
-        passage = navigate(gmc(2), lumen, OBLIQUE, step_mm=step_mm, refine=False)
+        passage = navigate(
+            gmc(2), lumen, OBLIQUE, step_mm=step_mm, friction=mu, refine=False
+        )
         push = np.array([step.push_N for step in passage.steps])
         at = np.array([step.insertion_mm for step in passage.steps])
         work = np.sum(np.diff(at) * (push[1:] + push[:-1]) / 2.0)
         stored = passage.steps[-1].energy_Nmm - passage.steps[0].energy_Nmm
-        lost.append(abs(work - stored))
-    assert lost[1] < 6e-3 * abs(stored)
+        rubbed = passage.steps[-1].rubbed_Nmm
+        lost.append(abs(work - stored - rubbed))
+    assert lost[1] < 0.012 * work
     assert lost[1] < 0.6 * lost[0]
+    assert (rubbed > 0.5 * stored) == (mu > 0.0)
+
+
+@pytest.mark.slow
+def test_friction_in_a_winding_tube_is_the_capstans():
+    """A soft rod, drawn at its tip, holds or pulls by exp(mu phi) at its guide.
+
+    With phi the angle by which it turns between its first and last contact: up to what
+    its stiffness adds where it bends and straightens.
+    """
+    rod, mu, tip_N = round_rod(26.0, 0.1, remanence_mT=100.0), 0.2, 0.01
+    tube = Tube(
+        name="half a turn", points_mm=helix(6.0, 10.0, 0.5, points=40), radius_mm=1.0,
+        direction=(1.0, 0.0, 0.0),
+    )  # fmt: skip
+    x, y, z = tube.at(tube.length_mm)[1]
+
+    def drawn(insertion_mm: float) -> Field:
+        share = min(1.0, max(0.0, (insertion_mm - 18.0) / 4.0))
+        return Field(
+            Uniform(
+                flux_mT=1e3 * share * tip_N / LOAD_N_T,
+                angle_deg=math.degrees(math.atan2(y, x)),
+                elevation_deg=math.degrees(math.atan2(z, math.hypot(x, y))),
+            )
+        )
+
+    passage = navigate(
+        rod, tube, drawn, friction=mu, way_mm=(24.0, 25.0, 24.0), step_mm=2.0,
+        refine=False,
+    )  # fmt: skip
+    let, back = [s for s in passage.steps if s.insertion_mm in (24.0, 25.0)][1:]
+    for step, way in ((let, -1.0), (back, 1.0)):
+        first, last = step.contacts[0].s_mm, step.contacts[-1].s_mm
+        inside = (step.s_mm >= first) & (step.s_mm <= last)
+        phi = np.trapezoid(step.shape[6][inside], step.s_mm[inside])
+        rope_N = tip_N * math.exp(way * mu * phi)
+        assert -step.push_N == pytest.approx(rope_N, rel=0.06)
 
 
 LOAD_N_T = math.pi / 4.0 * 1e-6 * 0.1 / (4e-7 * math.pi)
