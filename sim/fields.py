@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -213,6 +214,7 @@ class MagnetField(Field):
         """It is not."""
 
 
+@lru_cache(maxsize=256)
 def cuboid_of(magnet: Magnet, gap_mm: float | None = None) -> Cuboid:
     """Return a magnet as a source; without a gap, one that waits for it."""
     return Cuboid(
