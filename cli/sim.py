@@ -189,13 +189,13 @@ def _write(solution: Solution, rod: Specimen, out: Path) -> None:
 
 
 def _print_ending(end: dict[str, Any]) -> None:
-    x, y = end["place_mm"]
+    place = ", ".join(f"{value:.3f}" for value in end["place_mm"])
+    way = ", ".join(f"{value:.2f}" for value in end["turning"])
     say(f"  ends at      {end['load']:.5g} of the load")
     if end["kind"] == "contact":
-        say(f"  by contact   at ({x:.3f}, {y:.3f}) mm, s = {end['s_mm']:.3f} mm")
+        say(f"  by contact   at ({place}) mm, s = {end['s_mm']:.3f} mm")
     else:
-        dx, dy = end["turning"]
-        say(f"  in a fold    tip ({x:.3f}, {y:.3f}) mm, going ({dx:.2f}, {dy:.2f})")
+        say(f"  in a fold    tip ({place}) mm, going ({way})")
 
 
 def _print(data: dict[str, Any]) -> None:

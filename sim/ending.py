@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from .magnet.flux import distance_at
+from .planar.ends import end_of
 from .planar.march import M
 from .planar.near import settle
 from .planar.outcomes import OK_UNSTABLE
@@ -18,13 +18,11 @@ from .solution import Ending
 Array = NDArray[np.float64]
 Case = tuple[Array, Array, float, float]
 
-BEFORE = 1e-6
-"""How much below its last load, relatively, a rod is looked at."""
 TILT = 1e-3
 """Turn of the clamp, in rad, that makes a symmetric rod choose its side."""
 
 
-def ending(case: Case, load: float, length_mm: float) -> Ending | None:
+def ending(case: Case, load: float, length_mm: float) -> Ending:
     """Return how the branch that grows from no load ends.
 
     Parameters
@@ -37,30 +35,16 @@ def ending(case: Case, load: float, length_mm: float) -> Ending | None:
         Of the rod.
     """
     rod, field, clamp, margin = case
-    shapes = []
-    s = stations(241)
-    for below in (BEFORE, 1e-3):
-        part = rod.copy()
-        part[:, M:] *= load * (1.0 - below)
-        outcome, *_, table, _ = solve_planar(part, field, clamp, margin, s, ORDER, STEP)
-        if outcome > OK_UNSTABLE:
-            return None
-        shapes.append(table)
-    last, earlier = shapes
-    apart = np.array([distance_at(field, x, y, 0.0) for x, y in last[:2].T])
-    nearest = int(np.argmin(apart))
-    touches = bool(apart[nearest] <= margin + 2e-3)
-    way = last[:2] - earlier[:2]
-    size = float(np.max(np.hypot(*way)))
-    turning = way[:, -1] / size if size > 0.0 else way[:, -1]
-    at = nearest if touches else -1
-    return Ending(
-        kind="contact" if touches else "fold",
-        load=load,
-        s_mm=float(s[at]) * length_mm,
-        place_mm=(float(last[0, at]) * length_mm, float(last[1, at]) * length_mm),
-        turning=(float(turning[0]), float(turning[1])),
-    )
+
+    def shape_at(part: float) -> Array | None:
+        less = rod.copy()
+        less[:, M:] *= part
+        outcome, *_, table, _ = solve_planar(
+            less, field, clamp, margin, stations(241), ORDER, STEP
+        )
+        return table[:2] if outcome <= OK_UNSTABLE else None
+
+    return end_of(shape_at, load, field, margin, length_mm)
 
 
 def buckled_tips(case: Case, length_mm: float) -> tuple[tuple[float, float], ...]:

@@ -29,16 +29,17 @@ class Ending:
     s_mm : float
         Where along the rod: of the contact; the tip at a fold.
     place_mm : tuple of float
-        That point, just before.
+        That point, just before: x and y, or x, y and z of a rod in space.
     turning : tuple of float
-        Which way the tip goes as it ends: at a fold, the singular direction.
+        Which way the tip goes as it ends: at a fold, the singular direction; of the
+        size of what moves most, taken for 1.
     """
 
     kind: str
     load: float
     s_mm: float
-    place_mm: tuple[float, float]
-    turning: tuple[float, float]
+    place_mm: tuple[float, ...]
+    turning: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -36,8 +36,9 @@ from ..fields import (
 )
 from ..magnet.flux import UNIFORM, WIDTH, flux_at
 from ..planar.contact import load_before_touching, touches
+from ..planar.ends import end_of
 from ..scaling import MOST_POINTS, field_array, stations
-from ..solution import Solution
+from ..solution import Ending, Solution
 from .law import axis
 from .march import AXIAL, K1, K3, MU1, MU2, WX, WY, WZ, H, loads_on
 from .march import WIDTH as WIDE
@@ -70,7 +71,7 @@ class SpatialSolution:
         Rows d1, d2 and d3 (the tangent) in the specimen frame.
     curvature_per_mm : ndarray, shape (n, 3)
         Curvature about d1, d2 and twist about d3.
-    status, morse_index, error_mm, load_limit
+    status, morse_index, error_mm, load_limit, ending
         As of `Solution`; the index counts unstable directions in space.
     flux_tip_mT : tuple of float
         Flux density (x, y, z) at the tip.
@@ -88,6 +89,7 @@ class SpatialSolution:
     flux_tip_mT: Vector
     root_moment_Nm: Vector
     load_limit: float = 1.0
+    ending: Ending | None = None
 
     @property
     def tangent(self) -> Array:
@@ -122,7 +124,7 @@ class SpatialSolution:
             error_mm=self.error_mm, flux_tip_mT=self.flux_tip_mT[:2],
             root_moment_Nm=self.root_moment_Nm[2], load_limit=self.load_limit,
             stable_in_space=self.morse_index == 0 if centreline else None,
-            z_mm=self.r_mm[:, 2].copy() if centreline else None,
+            z_mm=self.r_mm[:, 2].copy() if centreline else None, ending=self.ending,
         )  # fmt: skip
 
     def _turn(self) -> Array:
@@ -217,12 +219,15 @@ def solve_table(
     index, load, error, states = _equilibrium(table, *rest)
     if index < 0:
 
-        def clear(part: float) -> bool:
+        def shape_at(part: float) -> Array | None:
             less = table.copy()
             less[:, LOADS] *= part
-            return _equilibrium(less, *rest)[0] >= 0
+            found, _, _, states = _equilibrium(less, *rest)
+            return states[:, PLACE[:3]].T.copy() if found >= 0 else None
 
-        return _gone(flux, L, load_before_touching(load, clear), unloaded[-1])
+        load = load_before_touching(load, lambda part: shape_at(part) is not None)
+        end = end_of(shape_at, load, flux, margin, L)
+        return replace(_gone(flux, L, load, unloaded[-1]), ending=end)
     if not _is_vector(field):
         x, y, z = states[:, 12:15].T
         refuse_outside(as_field(field), x, y, L, z)

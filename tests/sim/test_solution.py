@@ -50,6 +50,20 @@ def test_a_pulled_in_rod_tells_its_fold() -> None:
     assert end.turning[1] < 0.0  # toward the magnet
 
 
+@pytest.mark.parametrize("gap_mm", [20.0, 24.0])
+def test_a_rod_in_space_ends_where_it_does_in_the_plane(gap_mm: float) -> None:
+    field = MagnetField(magnet=CUBE, gap_mm=gap_mm)
+    rod = replace(gmc(2), remanence_mT=-400.0)
+    plane, space = solve(rod, field).ending, solve_spatial(rod, field).ending
+    assert space.kind == plane.kind
+    assert space.load == pytest.approx(plane.load, abs=1e-4)
+    assert space.place_mm == pytest.approx((*plane.place_mm, 0.0), abs=0.3)
+    tilted = replace(rod, remanence_z_mT=20.0)
+    end = solve(tilted, field).ending
+    assert end.kind == plane.kind
+    assert len(end.place_mm) == len(end.turning) == 3
+
+
 def test_the_straight_rod_against_the_field_names_its_buckled_shapes() -> None:
     field = UniformField(flux_mT=420.0, angle_deg=180.0)
     found = solve(gmc(2), field)
