@@ -24,7 +24,7 @@ SMALL = 1e-7
 MAX_TRIALS = 400
 """Most Newton runs along a branch; a branch that needs more is given up."""
 MIN_LOAD_STEP = 1e-7
-SURE = 1e-3
+SURE = 1e-6
 """Step of the load too short for a jump to another branch."""
 
 
