@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from . import sim_equilibria, sim_magnet, sim_navigate, sim_path, sim_steer, sim_sweep
+from . import (
+    sim_equilibria,
+    sim_magnet,
+    sim_navigate,
+    sim_path,
+    sim_pull_in,
+    sim_steer,
+    sim_sweep,
+)
 from .console import group, print_json, say
 from .sim_case import field_of, rod_of
 
@@ -25,6 +33,7 @@ app.command("equilibria", epilog=sim_equilibria.EXAMPLE)(sim_equilibria.equilibr
 app.command("magnet", epilog=sim_magnet.EXAMPLE)(sim_magnet.magnet)
 app.command("navigate", epilog=sim_navigate.EXAMPLE)(sim_navigate.navigate)
 app.command("path", epilog=sim_path.EXAMPLE)(sim_path.path)
+app.command("pull-in", epilog=sim_pull_in.EXAMPLE)(sim_pull_in.pull_in)
 app.command("steer", epilog=sim_steer.EXAMPLE)(sim_steer.steer)
 app.command("sweep", epilog=sim_sweep.EXAMPLE)(sim_sweep.sweep)
 

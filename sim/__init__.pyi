@@ -107,7 +107,13 @@ from .path.draw import (
     draw_path as draw_path,
 )
 from .path.draw import (
+    draw_pull_in as draw_pull_in,
+)
+from .path.draw import (
     path_csv as path_csv,
+)
+from .path.draw import (
+    pull_in_csv as pull_in_csv,
 )
 from .path.follow import (
     Path as Path,
@@ -120,6 +126,12 @@ from .path.follow import (
 )
 from .path.follow import (
     follow_path as follow_path,
+)
+from .path.pull_in import (
+    PullIn as PullIn,
+)
+from .path.pull_in import (
+    pull_in_gaps as pull_in_gaps,
 )
 from .planar.march import (
     march as march,

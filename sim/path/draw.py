@@ -12,6 +12,7 @@ from ...core.checks import shown
 from ...core.errors import InputError
 from ..study.figures import save
 from .follow import Path
+from .pull_in import PullIn
 
 COLUMNS = (
     "status", "morse_index", "tip_x_mm", "tip_y_mm", "tip_angle_deg", "energy_uJ",
@@ -129,3 +130,49 @@ def animate_path(file: File, path: Path, *, title: str) -> None:
         buffer, "GIF", save_all=True, append_images=frames[1:], duration=80, loop=0
     )
     write_bytes(file, buffer.getvalue())
+
+
+def pull_in_csv(found: PullIn) -> str:
+    """Return a map of pull-in as CSV: a row a design; empty where there is none."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow([*found.names, "pull_in_gap_mm"])
+    for y, row in zip(found.y.tolist(), found.gap_mm.tolist(), strict=True):
+        for x, gap in zip(found.x.tolist(), row, strict=True):
+            last = "" if np.isnan(gap) else f"{gap:.9g}"
+            writer.writerow([f"{x:.15g}", f"{y:.15g}", last])
+    return buffer.getvalue()
+
+
+def draw_pull_in(file: File, found: PullIn, *, title: str) -> None:
+    """Draw the gap at which rods are pulled in, over their two properties.
+
+    Raises
+    ------
+    InputError
+        If the suffix is none of .svg, .pdf and .png, or a property has one value only.
+    """
+    from matplotlib.figure import Figure
+
+    if min(found.gap_mm.shape) < 2:
+        raise InputError(
+            "a figure of pull-in gaps must have at least two values of each property; "
+            f"instead received {len(found.x)} and {len(found.y)}"
+        )
+    figure = Figure(figsize=(6.0, 4.6), layout="constrained")
+    axes = figure.subplots()
+    low, high = found.range_mm
+    gap = np.where(np.isinf(found.gap_mm), high, found.gap_mm)
+    axes.set_facecolor("0.85")
+    mesh = axes.pcolormesh(found.x, found.y, gap, shading="nearest", cmap="viridis")
+    if np.nanmax(gap, initial=0.0) > np.nanmin(gap, initial=high):
+        lines = axes.contour(found.x, found.y, gap, colors="white", linewidths=0.8)
+        axes.clabel(lines, fontsize=7, fmt="%g")
+    figure.colorbar(mesh, ax=axes, label="pull-in gap in mm")
+    for name, label in zip(
+        found.names, (axes.set_xlabel, axes.set_ylabel), strict=True
+    ):
+        what, unit = name.rsplit("_", 1)
+        label(f"{what} in {unit}")
+    axes.set_title(f"{title} (grey: not pulled in down to {low:g} mm)", fontsize=9)
+    save(figure, file)

@@ -36,9 +36,9 @@ from ..fields import (
     check_plain,
     refuse_outside,
 )
-from ..one_rod import solve
 from ..planar.near import LOST, TOUCHING, settle
-from ..planar.solver import ORDER, STEP, solve_planar
+from ..planar.outcomes import GONE, OK_UNSTABLE, TOUCHES
+from ..planar.solver import ORDER, STEP, failure, solve_planar
 from ..scaling import field_array, rod_array, stations
 from .cases import QUANTITIES, Case
 from .energy import energy_uJ
@@ -219,23 +219,26 @@ class _Walk:
         self.dissipated_uJ = 0.0
         self.u: Array | None = None
         self.index = 0
+        self.is_begun = False
 
     def start(self, value: float, *, snapped: bool = False) -> PathPoint:
         """Return the equilibrium that grows from no load, or that there is none."""
-        specimen, field, support = self.case(value)
-        solution = solve(specimen, field, support=support)
-        self.u = None
-        if solution.centreline is None:
-            return PathPoint(
-                value=value, status=PULLED_IN, centreline=None, morse_index=-1,
-                energy_uJ=math.nan, snapped=snapped,
-            )  # fmt: skip
-        self.index = solution.morse_index
-        self.u = solve_planar(*self._arrays(value), stations(2), ORDER, STEP)[-1]
-        return self._point(value, snapped=snapped)
+        arrays = self._arrays(value)
+        outcome, self.index, *_, u = solve_planar(*arrays, stations(61), ORDER, STEP)
+        self.u = u if outcome <= OK_UNSTABLE else None
+        if self.u is not None:
+            return self._point(value, snapped=snapped)
+        if outcome != GONE and not (self.is_begun and outcome == TOUCHES):
+            specimen, field, _ = self.case(value)
+            raise failure(outcome, specimen, field, 0.0)
+        return PathPoint(
+            value=value, status=PULLED_IN, centreline=None, morse_index=-1,
+            energy_uJ=math.nan, snapped=snapped,
+        )  # fmt: skip
 
     def go(self, a: float, b: float) -> PathPoint:
         """Return the point at `b`, after that at `a`."""
+        self.is_begun = True
         if self.u is None:
             return self.start(b)
         at, jump, before = a, b - a, self.u
