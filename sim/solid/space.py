@@ -33,12 +33,12 @@ def solve_in_space(
     points: int,
 ) -> SpatialSolution:  # fmt: skip
     """Return the equilibrium in space of a straight solid magnetised along its axis."""
-    table = _held(specimen, support, poisson_ratio)
+    table, shown = solid_tables(specimen, support, poisson_ratio)
     L = specimen.length_mm
     across = specimen.cross_sections
     margin = 0.5 * max(min(part.width_mm, part.height_mm) for part in across) / L
     unit_Nmm = specimen.sections[0].E_MPa * across[0].in_plane_mm4 / L
-    return solve_table(table, margin, L, unit_Nmm, field, support, points)
+    return solve_table(table, margin, L, unit_Nmm, field, support, points, shown)
 
 
 def largest_strain(
@@ -70,16 +70,15 @@ def largest_strain(
 
 
 @lru_cache(maxsize=256)
-def _held(specimen: Specimen, support: Support, poisson_ratio: float) -> Array:
-    return solid_table(specimen, support, poisson_ratio)
-
-
-def solid_table(specimen: Specimen, support: Support, poisson_ratio: float) -> Array:
-    """Return the rod as `spatial.march` takes it, tip first, shape (n, 39).
+def solid_tables(
+    specimen: Specimen, support: Support, poisson_ratio: float
+) -> tuple[Array, Array]:
+    """Return the rod as `spatial.march` takes it, tip first, (n, 36), and its sections.
 
     What a fixed face does to the rod, and a stiffer neighbour beyond a joint, is that
     of a short stiffer piece: as long as is needed for the shift that comes with the
-    turn. There are more rows than sections for that.
+    turn. There are more rows than sections for that; the second array has, in the place
+    of each piece, the section that it is a piece of.
     """
     given = replace(specimen, poisson_ratio=poisson_ratio)
     rod = rod_table(SpatialRod.from_specimen(given), support)[::-1]
@@ -90,6 +89,7 @@ def solid_table(specimen: Specimen, support: Support, poisson_ratio: float) -> A
     for row, across, constants in zip(table, sections, found, strict=True):
         _write_law(row, across, constants, poisson_ratio, specimen.length_mm)
     rows: list[Array] = []
+    shown: list[Array] = []
     L = specimen.length_mm
     last = len(table) - 1
     for i, row in enumerate(table):
@@ -100,8 +100,10 @@ def solid_table(specimen: Specimen, support: Support, poisson_ratio: float) -> A
             if 0 <= k <= last and sections[k] == sections[i]:
                 share = joint_share(min(E_MPa / specimen.sections[k].E_MPa, 1.0))
             ends.append(_end(row, sections[i], found[i], share, poisson_ratio, L))
-        rows += _with_ends(row, ends[0], ends[1], specimen.sections[i].length_mm)
-    return np.array(rows[::-1])
+        pieces = _with_ends(row, ends[0], ends[1], specimen.sections[i].length_mm)
+        rows += pieces
+        shown += [row] * len(pieces)
+    return np.array(rows[::-1]), np.array(shown[::-1])
 
 
 def _write_law(
@@ -125,7 +127,6 @@ def _write_law(
     row[law.S1 : law.S2 + 1] = constants.stiff * sizes[:2]
     corner = np.sqrt(radii) if across.is_round else np.array([w, h]) / math.sqrt(12.0)
     row[law.FACE1], row[law.FACE2] = corner
-    row[law.SHARE :] = 1.0
 
 
 def _end(
@@ -140,18 +141,16 @@ def _end(
     would have it.
     """
     sizes = np.array([across.height_mm, across.width_mm]) / L
-    turns = np.append(
-        constants.turn * sizes, constants.twist_turn * sizes.prod() ** 0.5
-    )
-    if share == 0.0 or not turns.any():
+    turn, shift = np.array(constants.turn), np.array(constants.shift)
+    turns = np.append(turn * sizes, constants.twist_turn * sizes.prod() ** 0.5)
+    if share == 0.0:
         return None
-    shifts = 0.8 * np.array(constants.shift) / constants.turn * sizes
+    lengths = np.minimum(0.8 * shift, turn) / np.where(turn > 0.0, turn, 1.0)
     piece = row.copy()
-    piece[H] = max(*np.minimum(shifts, sizes), 1.25 * turns[2])
+    piece[H] = max(*(np.where(turn > 0.0, lengths, 1.0) * sizes), 1.25 * turns[2])
     left = 1.0 - share * turns / piece[H]
     piece[C1 : C3 + 1] *= left
     piece[law.R1 : law.R3 + 1] /= left
-    piece[law.SHARE :] = left
     softens = row[law.P11 : law.P22 + 1] / row[law.R1 : law.R2 + 1]
     at_zero, per_ratio = END_CUBIC[across.is_round]
     cubic = share * (at_zero + per_ratio * poisson_ratio)

@@ -24,12 +24,11 @@ from ..magnet.flux import flux_at
 
 (
     T, G1, G2, BEND, TWIST, STRETCH, R1, R2, R3,
-    P11, P22, P12, P13, P23, S1, S2, FACE1, FACE2, BEND2, A1, A2, B1, B2, SHARE,
-) = range(13, 37)  # fmt: skip
+    P11, P22, P12, P13, P23, S1, S2, FACE1, FACE2, BEND2, A1, A2, B1, B2,
+) = range(13, 36)  # fmt: skip
 """Compliances of stretch and shear; alpha of bending and torsion; `NU`; r_i^2; P; S;
-where along d1 and d2 the four Gauss points of the end face are; beta of bending; A; B;
-and the first of three shares of a section's own compliances that an end of it has."""
-SOLID_WIDTH = 39
+where along d1 and d2 the four Gauss points of the end face are; beta; A; B."""
+SOLID_WIDTH = 36
 _C1, _WX = 1, 10
 """Where a row's three compliances and its weight begin, as in `march`."""
 
@@ -90,13 +89,12 @@ def axis(rows, states, directors, curvature):  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    rows : ndarray, shape (n, 39)
+    rows : ndarray, shape (n, 36)
         The section at each station.
     states : ndarray, shape (n, 18)
         The state there, as of `march`.
     directors, curvature : ndarray, shapes (n, 3, 3) and (n, 3)
         The sections tilt against the axis by the shear, which counts to first order.
-        At an end of a section the curvature is what it tends to.
     """
     v, H = np.empty(6), np.empty((7, 6))
     for k in range(rows.shape[0]):
@@ -117,8 +115,6 @@ def axis(rows, states, directors, curvature):  # type: ignore[no-untyped-def]
         for i in range(3):
             q0 -= p[_WX + i] * y[3 * i]
             q1 -= p[_WX + i] * y[3 * i + 1]
-        for i in range(3):
-            v[i] /= p[SHARE + i]
         curvature[k, 0] = v[0] - a * v[2] - p[G2] * q1
         curvature[k, 1] = v[1] - c * v[2] + p[G1] * q0
         curvature[k, 2] = v[2] + a * v[0] + c * v[1]

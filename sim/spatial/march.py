@@ -32,7 +32,7 @@ import numpy as np
 from ...core.jit import njit
 from ..magnet.flux import PART, flux_at, is_uniform
 from .across import POSITIVE, add_columns, add_state, look, recall
-from .law import face_load, solid_slope
+from .law import SOLID_WIDTH, face_load, solid_slope
 
 H, C1, C2, C3, AXIAL, MU1, MU2, K1, K2, K3, WX, WY, WZ = range(13)
 WIDTH = 13
@@ -43,7 +43,7 @@ BLOCK = 72
 """Numbers of a state, and of a block of six columns."""
 ROW, BLOCKS = 20, 2
 """Room for a state, a whole number of vectors; most blocks of columns."""
-Y = 36
+Y = SOLID_WIDTH
 Z = Y + ROW
 LOOK = Z + BLOCKS * BLOCK
 LOOK_Z = LOOK + ROW

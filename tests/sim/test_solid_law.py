@@ -39,7 +39,6 @@ def table(*, strength: float = 1.0) -> np.ndarray:
         row[law.A1 : law.B2 + 1] = (
             np.array([0.2, 0.1, 0.3, 0.4]) * strength * row[law.R1]
         )
-        row[law.SHARE :] = 1.0
         row[[law.FACE1, law.FACE2]] = np.array([0.03, 0.02]) * strength
     return wide
 
