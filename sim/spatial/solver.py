@@ -190,7 +190,7 @@ def solve_spatial(
 def solve_table(
     table: Array, margin: float, length_mm: float, unit_Nmm: float,
     field: Field | Sequence[float], support: Support, points: int,
-    shown: Array | None = None,
+    laws: Array | None = None,
 ) -> SpatialSolution:  # fmt: skip
     """Return the equilibrium of a rod as the kernels take it, tip first.
 
@@ -204,7 +204,7 @@ def solve_table(
         Its length, and its unit of moments.
     field, support, points
         As of `solve_spatial`.
-    shown : ndarray, optional
+    laws : ndarray, optional
         Of a solid, in the place of each row the section whose law tells the curvature.
     """
     L, clamp = length_mm, clamp_of(support)
@@ -234,9 +234,9 @@ def solve_table(
         x, y, z = states[:, 12:15].T
         refuse_outside(as_field(field), x, y, L, z)
     solution = _solution(L, unit_Nmm * 1e-3, flux, s, states, index, error)
-    if shown is not None:
+    if laws is not None:
         joints = np.cumsum(table[::-1, H])[:-1]
-        rows = shown[::-1][np.searchsorted(joints, s, side="right")]
+        rows = laws[::-1][np.searchsorted(joints, s, side="right")]
         directors, curvature = np.empty((points, 3, 3)), np.empty((points, 3))
         axis(rows, states[:, :18], directors, curvature)
         return replace(solution, directors=directors, curvature_per_mm=curvature / L)
