@@ -46,6 +46,8 @@ class SolidConstants:
         s in the energy's sixth order, E A (s_1 x_1^2 + s_2 x_2^2)^3 / 6.
     cross : tuple of float
         c in the energy E A c x_i^2 x_j^2 / 2 of the pairs 12, 13, 23.
+    twisted_shear : tuple of float
+        Shear, without a force, of a section bent and twisted: per x_i x_3.
     bow : tuple of float
         b in the energy N (x_1^2 + x_2^2) (b_1 x_1^2 + b_2 x_2^2) / 4.
     turn, shift : tuple of float
@@ -63,6 +65,7 @@ class SolidConstants:
     soften: tuple[float, float]
     stiff: tuple[float, float]
     cross: tuple[float, float, float]
+    twisted_shear: tuple[float, float]
     bow: tuple[float, float]
     turn: tuple[float, float]
     shift: tuple[float, float]
@@ -75,7 +78,7 @@ def solid_constants(across: CrossSection, poisson_ratio: float) -> SolidConstant
     Parameters
     ----------
     across : CrossSection
-        Sides of a rectangle at most 3 to 1; bore of a tube 0.2 to 0.5 of its diameter.
+        Square, round, or a rectangle of sides at most 3 to 1.
     poisson_ratio : float
         From 0 to 0.5.
 
@@ -105,6 +108,7 @@ def solid_constants(across: CrossSection, poisson_ratio: float) -> SolidConstant
         soften=(aside["soften"], ahead["soften"]),
         stiff=(aside["stiff"], ahead["stiff"]),
         cross=(ahead["cross_bending"], aside["cross_torsion"], ahead["cross_torsion"]),
+        twisted_shear=(aside["twisted_shear"], ahead["twisted_shear"]),
         bow=(aside["bow"], ahead["bow"]),
         turn=(aside["turn"], ahead["turn"]),
         shift=(aside["shift"], ahead["shift"]),
@@ -142,14 +146,10 @@ def _place(across: CrossSection) -> tuple[str, float]:
         return "rectangle", math.log(ratio)
     if across.bore_mm == 0.0:
         return "round", 0.0
-    bore = across.bore_mm / across.width_mm
-    if not 0.2 <= bore <= 0.5:
-        raise InputError(
-            "the solid model takes tubes with a bore of 0.2 to 0.5 of the diameter; "
-            f"instead received {across.bore_mm:g} mm of {across.width_mm:g} mm: use "
-            "model 'rod'"
-        )
-    return "tube", bore
+    raise InputError(
+        "the solid model takes no tubes; instead received one of bore "
+        f"{across.bore_mm:g} mm: use model 'rod'"
+    )
 
 
 def _interpolated(family: str, place: float, nu: float) -> dict[str, float]:

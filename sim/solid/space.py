@@ -73,7 +73,7 @@ def largest_strain(
 def solid_tables(
     specimen: Specimen, support: Support, poisson_ratio: float
 ) -> tuple[Array, Array]:
-    """Return the rod as `spatial.march` takes it, tip first, (n, 36), and its sections.
+    """Return the rod as `spatial.march` takes it, tip first, (n, 40), and its sections.
 
     What a fixed face does to the rod, and a stiffer neighbour beyond a joint, is that
     of a short stiffer piece: as long as is needed for the shift that comes with the
@@ -121,6 +121,7 @@ def _write_law(
     row[law.BEND2] = constants.bending_twice
     row[law.A1 : law.A2 + 1] = sizes[:2]
     row[law.B1 : law.B2 + 1] = constants.bow * sizes[:2]
+    row[law.M1 : law.M2 + 1] = constants.twisted_shear * np.sqrt(sizes[:2] * sizes[2])
     row[law.P11 : law.P22 + 1] = constants.soften * radii * sizes[:2]
     pairs = sizes[[0, 0, 1]] * sizes[[1, 2, 2]]
     row[law.P12 : law.P23 + 1] = constants.cross * pairs

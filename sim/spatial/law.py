@@ -8,9 +8,10 @@ that work is conserved:
     r_i^2 f_i = r_i^2 (alpha_i e + beta_i e^2) + sum_j P_ij k_j^2
                 + S_i (S_1 k_1^2 + S_2 k_2^2)^2 + e (A_i V + B_i U) / 2
     eps       = e + NU e^2 / 2 + sum_i (alpha_i / 2 + beta_i e) r_i^2 k_i^2 + U V / 4
-    gamma_i   = G_i Q_i,    U = A_1 k_1^2 + A_2 k_2^2,    V = B_1 k_1^2 + B_2 k_2^2
+    gamma_i   = G_i Q_i + M_i k_i k_3,    U = sum A_i k_i^2,    V = sum B_i k_i^2
 
-where r_i^2 is the stiffness of k_i over that of e. Dimensionless as `spatial.march`.
+and by the last term curvatures gain C_i M_i Q_i k_3, and twist C_3 sum M_i Q_i k_i.
+There r_i^2 is the stiffness of k_i over that of e. Dimensionless as `spatial.march`.
 """
 
 from __future__ import annotations
@@ -24,11 +25,12 @@ from ..magnet.flux import flux_at
 
 (
     T, G1, G2, BEND, TWIST, STRETCH, R1, R2, R3,
-    P11, P22, P12, P13, P23, S1, S2, FACE1, FACE2, BEND2, A1, A2, B1, B2,
-) = range(13, 36)  # fmt: skip
+    P11, P22, P12, P13, P23, S1, S2, FACE1, FACE2, BEND2, A1, A2, B1, B2, M1, M2,
+) = range(13, 38)  # fmt: skip
 """Compliances of stretch and shear; alpha of bending and torsion; `NU`; r_i^2; P; S;
-where along d1 and d2 the four Gauss points of the end face are; beta; A; B."""
-SOLID_WIDTH = 36
+where along d1 and d2 the four Gauss points of the end face are; beta; A; B; M."""
+SOLID_WIDTH = 40
+"""Two are unused: a whole number of vectors."""
 _C1, _WX = 1, 10
 """Where a row's three compliances and its weight begin, as in `march`."""
 
@@ -54,8 +56,12 @@ def strains(p, y, v, H):  # type: ignore[no-untyped-def]
     f0 = bend + (f0 + 0.5 * e * (p[A1] * V + p[B1] * U)) / p[R1]
     f1 = bend + (f1 + 0.5 * e * (p[A2] * V + p[B2] * U)) / p[R2]
     f2 = 1.0 + p[TWIST] * e + f2 / p[R3]
-    v[0], v[1], v[2] = k0 * f0, k1 * f1, k2 * f2
-    v[3], v[4] = p[G1] * H[6, 0], p[G2] * H[6, 1]
+    q0, q1 = p[M1] * H[6, 0], p[M2] * H[6, 1]
+    v[0] = k0 * f0 + p[_C1] * q0 * k2
+    v[1] = k1 * f1 + p[_C1 + 1] * q1 * k2
+    v[2] = k2 * f2 + p[_C1 + 2] * (q0 * k0 + q1 * k1)
+    v[3] = p[G1] * H[6, 0] + p[M1] * k0 * k2
+    v[4] = p[G2] * H[6, 1] + p[M2] * k1 * k2
     bent = p[R1] * b0 + p[R2] * b1
     bow = (p[BEND] + 2.0 * p[BEND2] * e) * bent + p[TWIST] * p[R3] * b2 + 0.5 * U * V
     v[5] = e + 0.5 * p[STRETCH] * e * e + 0.5 * bow
@@ -70,8 +76,13 @@ def strains(p, y, v, H):  # type: ignore[no-untyped-def]
     per = 2.0 * p[T] / (p[R1] * p[R2] * p[R3])
     g2 = p[P12] + s * p[S1] * p[S2] + 0.5 * e * (p[A1] * p[B2] + p[A2] * p[B1])
     H[0, 1] = H[1, 0] = per * p[R3] * k0 * k1 * g2
-    H[0, 2] = H[2, 0] = per * p[R2] * k0 * k2 * p[P13]
-    H[1, 2] = H[2, 1] = per * p[R1] * k1 * k2 * p[P23]
+    H[0, 2] = per * p[R2] * k0 * k2 * p[P13] + p[_C1] * p[_C1 + 2] * q0
+    H[1, 2] = per * p[R1] * k1 * k2 * p[P23] + p[_C1 + 1] * p[_C1 + 2] * q1
+    H[2, 0], H[2, 1] = H[0, 2], H[1, 2]
+    H[0, 3] = H[3, 0] = p[_C1] * p[M1] * k2
+    H[1, 4] = H[4, 1] = p[_C1 + 1] * p[M2] * k2
+    H[2, 3] = H[3, 2] = p[_C1 + 2] * p[M1] * k0
+    H[2, 4] = H[4, 2] = p[_C1 + 2] * p[M2] * k1
     slope = p[BEND] + 2.0 * p[BEND2] * e
     H[0, 5] = slope + 0.5 * (p[A1] * V + p[B1] * U) / p[R1]
     H[1, 5] = slope + 0.5 * (p[A2] * V + p[B2] * U) / p[R2]
@@ -89,7 +100,7 @@ def axis(rows, states, directors, curvature):  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    rows : ndarray, shape (n, 36)
+    rows : ndarray, shape (n, 40)
         The section at each station.
     states : ndarray, shape (n, 18)
         The state there, as of `march`.
@@ -156,10 +167,12 @@ def _columns(y, v, H, Z, F):  # type: ignore[no-untyped-def]
         q0 = n1 * x2 - n2 * x1 + d0 * y[0] + d1 * y[3] + d2 * y[6]
         q1 = n2 * x0 - n0 * x2 + d0 * y[1] + d1 * y[4] + d2 * y[7]
         q2 = n0 * x1 - n1 * x0 + d0 * y[2] + d1 * y[5] + d2 * y[8]
-        v0 = H[0, 0] * a0 + H[0, 1] * a1 + H[0, 2] * a2 + H[0, 5] * q2
-        v1 = H[1, 0] * a0 + H[1, 1] * a1 + H[1, 2] * a2 + H[1, 5] * q2
+        v0 = H[0, 0] * a0 + H[0, 1] * a1 + H[0, 2] * a2 + H[0, 3] * q0 + H[0, 5] * q2
+        v1 = H[1, 0] * a0 + H[1, 1] * a1 + H[1, 2] * a2 + H[1, 4] * q1 + H[1, 5] * q2
         v2 = H[2, 0] * a0 + H[2, 1] * a1 + H[2, 2] * a2 + H[2, 5] * q2
-        g0, g1 = H[3, 3] * q0, H[4, 4] * q1
+        v2 += H[2, 3] * q0 + H[2, 4] * q1
+        g0 = H[3, 0] * a0 + H[3, 2] * a2 + H[3, 3] * q0
+        g1 = H[4, 1] * a1 + H[4, 2] * a2 + H[4, 4] * q1
         g2 = H[5, 0] * a0 + H[5, 1] * a1 + H[5, 2] * a2 + H[5, 5] * q2
         F[0, a] = w1 * x2 - w2 * x1 - v0
         F[1, a] = w2 * x0 - w0 * x2 - v1

@@ -36,6 +36,7 @@ def table(*, strength: float = 1.0) -> np.ndarray:
         shape = np.array([0.04, 0.05, -0.02, 0.03, 0.01, 0.4, 0.3]) * strength
         row[law.P11 : law.S2 + 1] = shape * row[law.R1]
         row[law.BEND2] = 4.0 * strength
+        row[[law.M1, law.M2]] = np.array([-2e-4, 3e-4]) * strength
         row[law.A1 : law.B2 + 1] = (
             np.array([0.2, 0.1, 0.3, 0.4]) * strength * row[law.R1]
         )
