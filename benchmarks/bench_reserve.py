@@ -1,18 +1,22 @@
 """Errors on strangers' benches: scenes drawn at random, none of them tuned on.
 
     python benchmarks/bench_reserve.py [--count 200] [--seed 9001] [--page DIR]
+    python benchmarks/bench_reserve.py --kind blur --count 100 --seed 9101
 
 Seeds below 1000 are for work on the code; quoted figures come from seeds of 9000 and
 above that nobody looked at before. Prints, by difficulty: how many were measured,
 needless refusals, those wrong without a flag (RMS above 0.15 mm or tip above 0.5 mm),
-errors in mm, and the direction's pull in stated deviations. ``--page`` draws overlays
-of the refused and of the ten worst.
+errors in mm, and the direction's pull in stated deviations; then how many right
+ones are doubted. ``--kind`` draws one kind only, and prints it by what was drawn (of
+blur: defocus, motion, grain, gloss, exposure). ``--page`` draws overlays of the refused
+and of the ten worst.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -49,8 +53,12 @@ class Row:
         return self.rms > WRONG_RMS_MM or self.tip > WRONG_TIP_MM
 
     @property
+    def doubted(self) -> bool:
+        return bool(DOUBTS & set(self.found.flags))
+
+    @property
     def silent(self) -> bool:
-        return self.wrong and not DOUBTS & set(self.found.flags)
+        return self.wrong and not self.doubted
 
 
 def measured(case: Case) -> Row:
@@ -83,25 +91,24 @@ def measured(case: Case) -> Row:
     )  # fmt: skip
 
 
-def table(rows: list[Row]) -> str:
+def table(groups: dict[str, list[Row]]) -> str:
     lines = [
         f"{'kind':10} {'scenes':>6} {'refused':>7} {'wrong':>6} {'silent':>6} "
         f"{'RMS med':>8} {'90 %':>7} {'tip med':>8} {'90 %':>7} {'length':>7} "
         f"{'width':>7} {'z RMS':>6} {'68 %':>5}"
     ]
-    for kind in (*KINDS, "all"):
-        some = [row for row in rows if kind in (row.case.kind, "all")]
+    for name, some in groups.items():
         good = [row for row in some if row.found.ok]
         head = (
-            f"{kind:10} {len(some):6} {len(some) - len(good):7} "
+            f"{name:10} {len(some):6} {len(some) - len(good):7} "
             f"{sum(row.wrong for row in good):6} {sum(row.silent for row in good):6} "
         )
         if not good:
             lines.append(head)
             continue
         rms, tip, length, width, pull = (
-            np.array([getattr(row, name) for row in good])
-            for name in ("rms", "tip", "length", "width", "pull")
+            np.array([getattr(row, what) for row in good])
+            for what in ("rms", "tip", "length", "width", "pull")
         )
         lines.append(
             head + f"{np.median(rms):8.4f} {np.quantile(rms, 0.9):7.4f} "
@@ -110,6 +117,26 @@ def table(rows: list[Row]) -> str:
             f"{np.sqrt(np.mean(pull**2)):6.2f} {100 * np.mean(np.abs(pull) < 1):4.0f}%"
         )
     return "\n".join(lines)
+
+
+def grouped(rows: list[Row], kind: str | None) -> dict[str, list[Row]]:
+    """Return the rows by kind, or those of one kind by the words for what was drawn."""
+
+    def name_of(row: Row) -> str:
+        return row.case.words if kind else row.case.kind
+
+    names = sorted({name_of(row) for row in rows}) if kind else KINDS
+    groups = {name: [row for row in rows if name_of(row) == name] for name in names}
+    return {**groups, "all": rows}
+
+
+def doubts(rows: list[Row]) -> str:
+    """Return how many of the right measurements are doubted, and by which flags."""
+    right = [row for row in rows if row.found.ok and not row.wrong]
+    count = Counter(flag for row in right for flag in DOUBTS & set(row.found.flags))
+    named = ", ".join(f"{flag} {number}" for flag, number in count.most_common())
+    doubted = sum(row.doubted for row in right)
+    return f"doubted though right: {doubted} of {len(right)} ({named})"
 
 
 def coverage(rows: list[Row]) -> str:
@@ -142,11 +169,14 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seed", type=int, default=9001)
+    parser.add_argument("--kind", choices=KINDS, help="this kind of scene only")
     parser.add_argument("--page", type=Path, help="folder for overlays")
     parser.add_argument("--quiet", action="store_true", help="the table alone")
     options = parser.parse_args()
     rows = []
-    for index in range(options.first, options.first + options.count):
+    step = len(KINDS) if options.kind else 1
+    first = KINDS.index(options.kind) if options.kind else options.first
+    for index in range(first, first + step * options.count, step):
         row = measured(draw_case(options.seed, index))
         rows.append(row)
         if not options.quiet:
@@ -157,8 +187,9 @@ def main() -> int:
             )
             flags = ",".join(row.found.flags)
             print(f"{row.case.photo.source} {row.case.words}: {what} [{flags}]")
-    print(table(rows))
+    print(table(grouped(rows, options.kind)))
     print(coverage(rows))
+    print(doubts(rows))
     if options.page is not None:
         write_page(rows, options.page)
     return 1 if any(row.silent for row in rows) else 0

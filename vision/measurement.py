@@ -114,6 +114,8 @@ class Measurement:
         and of where along the rod it leaves the clamp; NaN without a calibration.
     length_px, width_px : float
         Arc length and median width in the photograph, in pixels.
+    blur_px : float
+        Standard deviation of the blur across the rod's edges, in pixels.
     clamp_angle_sd_deg : float
         Standard deviation of the direction at the clamp, which turns the whole
         specimen frame and is in no point's `sigma_mm`; NaN without a calibration.
@@ -146,6 +148,7 @@ class Measurement:
     clamp_sd_mm: float = math.nan
     length_px: float = math.nan
     width_px: float = math.nan
+    blur_px: float = math.nan
     clamp_px: tuple[float, float] = NAN2
     tip_px: tuple[float, float] = NAN2
     pose: Pose | None = None

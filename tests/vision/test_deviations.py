@@ -53,6 +53,9 @@ def test_white_paper_hides_how_much_light_there_was(plain):
 
 def test_a_blurred_tip_is_known_less_well(plain):
     blurred = measured(replace(SCENE, light=SceneLight(blur_px=3.0)))
+    assert blurred.blur_px == pytest.approx(3.0, abs=0.3)
+    assert "blurred" in blurred.flags
+    assert "blurred" not in plain.flags
     assert blurred.length_sd_mm > 1.5 * plain.length_sd_mm
     assert abs(blurred.length_mm - LENGTH) < 3.0 * blurred.length_sd_mm
 

@@ -57,8 +57,8 @@ def test_direction_that_leaves_the_tip_unsure_is_doubted():
         )
         return doubts(line, photo, view, refined, rod, setting).flags
 
-    assert "direction_doubtful" not in flags(0.25)  # 0.13 mm at the tip
-    assert "direction_doubtful" in flags(0.35)  # 0.18 mm
+    assert "direction_doubtful" not in flags(0.2)  # 0.10 mm at the tip
+    assert "direction_doubtful" in flags(0.3)  # 0.16 mm
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,8 @@ FRAME_HEADER = (
     "width_mm", "clamp_x_px", "clamp_y_px", "tip_x_px", "tip_y_px", "clamp_x_mm",
     "clamp_y_mm", "clamp_angle_deg", "rod_height_mm", "reason",
     "clamp_angle_sd_deg", "own_angle_deg", "own_angle_sd_deg", "shared_clamp",
-    "length_sd_mm", "tip_x_sd_mm", "tip_y_sd_mm", "width_sd_mm", "clamp_sd_mm", "hints",
+    "length_sd_mm", "tip_x_sd_mm", "tip_y_sd_mm", "width_sd_mm", "clamp_sd_mm",
+    "blur_px", "hints",
 )  # fmt: skip
 _FRAME_TEXTS = ("image", "status", "flags", "reason", "shared_clamp", "hints")
 _FRAME_NUMBERS = tuple(name for name in FRAME_HEADER if name not in _FRAME_TEXTS)
@@ -68,6 +69,7 @@ class FrameRow:
     tip_sd_mm: tuple[float, float] = NAN2
     width_sd_mm: float = math.nan
     clamp_sd_mm: float = math.nan
+    blur_px: float = math.nan
     hints: str = ""
 
     @property
@@ -113,6 +115,7 @@ def done_with(
         own_angle_deg=angle, own_angle_sd_deg=found.clamp_angle_sd_deg,
         length_sd_mm=found.length_sd_mm, tip_sd_mm=found.tip_sd_mm,
         width_sd_mm=found.width_sd_mm, clamp_sd_mm=found.clamp_sd_mm,
+        blur_px=found.blur_px,
     )  # fmt: skip
     if not found.ok:
         return Done(row=row, sha256=sha256)
@@ -270,7 +273,7 @@ def _frame_cells(row: FrameRow) -> list[str]:
     return [
         row.image, row.status, ";".join(row.flags), *map(_cell, sizes), row.reason,
         *map(_cell, angles), row.shared_clamp, *map(_cell, deviations),
-        row.hints,
+        _cell(row.blur_px), row.hints,
     ]  # fmt: skip
 
 
@@ -306,6 +309,7 @@ def _frame(text: Mapping[str, str], number: Mapping[str, float]) -> FrameRow:
         tip_sd_mm=(value("tip_x_sd_mm"), value("tip_y_sd_mm")),
         width_sd_mm=value("width_sd_mm"),
         clamp_sd_mm=value("clamp_sd_mm"),
+        blur_px=value("blur_px"),
         hints=text["hints"],
     )
 

@@ -22,7 +22,7 @@ from .root import RootPlace
 
 Array = NDArray[np.float64]
 
-TIP_BLUR, WIDTH_PX, WIDTH_SHADE = 0.045, 0.055, 0.3
+TIP_BLUR, WIDTH_PX, WIDTH_SHADE = 0.04, 0.055, 0.3
 """Systematic parts: of an end face whose edge is not straight, in blurs; of a width
 whose blur is no Gaussian's; and the share of a shade's pull that is left in a width."""
 FACE_SEEN, FACE_HIDDEN = 0.17, 0.14

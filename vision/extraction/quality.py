@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 LENGTH_TOLERANCE = 0.02
 
-TURN_MM = 0.15
+TURN_MM = 0.12
 """What the standard deviation of the direction at the clamp may do to the tip."""
 
 SCALE = 5e-4
@@ -39,6 +39,9 @@ one in the difference of two colours, over the paper's light in each."""
 
 OVER_PAPER, BARE = 1.0, 0.6
 """Widths of bare paper under an axis that are more than a speck, and its light."""
+
+BLURRED_PX, BLURRED = 1.8, 0.08
+"""Blur that is named: the lens is out of focus, or something moved; px and widths."""
 
 SHADE_PX = 0.04
 """Pull of a shade on the midline, before correction, above which it is named."""
@@ -125,6 +128,8 @@ def doubts(
         flags.append("direction_doubtful")
     if photo.clipped > 0.01:
         flags.append("overexposed")
+    if refined.blur > max(BLURRED_PX, BLURRED * result.width_px):
+        flags.append("blurred")
     if quantile(refined.shaded[refined.good], 0.9) > SHADE_PX:
         flags.append("shadow")
     unsure = refined.good.mean() < 0.8 or refined.fit.noise > 0.02 * result.width_px

@@ -23,7 +23,7 @@ from .setting import UNKNOWN_CLAMP_MM, Setting
 HIDDEN_MM = 0.05
 """What part of the root a clamp of unknown height may hide before that is named."""
 
-LINE_PX, BORDER_PX, CARRIED = 0.065, 0.3, 0.03
+LINE_PX, BORDER_PX, CARRIED = 0.055, 0.3, 0.03
 """Standard deviation of a place that a line tells, and of where a rod enters the
 picture; and of how far a line is carried to the height of the axis, as a share."""
 

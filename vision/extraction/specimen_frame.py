@@ -37,15 +37,21 @@ SAMPLING_PX = 0.002
 SHADE_LEFT = 0.17
 THETA_PX = 0.003
 """Systematic part of a tangent angle, times the width: pixel sampling, as above."""
-SUPPLE, SUPPLE_FREEDOM = 1.25, 5.0
+SUPPLE, SUPPLE_FREEDOM = 1.2, 5.0
 """Factor on the fit's own deviation of the direction at the clamp for a curve of so
 many free numbers, and with the root of more: they were chosen by the same points."""
+BENT_BACK, BACK, BENT = 1.5, 0.25, 0.01
+"""Factor for a rod that is bent both ways, the lesser way by this share at least, and
+by so much over its width: no single force makes that, and what is known of moments
+helps less at the root."""
 TURN_SHADE, TURN_WALL, TURN_PALE_WALL = 0.35, 0.14, 0.4
 """Shares of the shade's pull, and of the side wall that is seen (on a rod that is not
 dark: its light is not known), by which the midline is off all along, with one sign."""
-DRIFT_SHADE, DRIFT_BENT, DRIFT_WHITE, DRIFT_REACH = 0.15, 0.15, 0.03, 1.5
-"""Errors that neighbours share over so many widths: of the shade's pull; by the angle
-that a rod turns over its width, px; and of the blur where the paper is white."""
+DRIFT_SHADE, DRIFT_WHITE, DRIFT_REACH = 0.15, 0.03, 1.5
+DRIFT_BENT, DRIFT_PALE_BENT = 0.15, 0.4
+"""Errors that neighbours share over so many widths: of the shade's pull; of the blur
+where the paper is white; and, px, by the angle that a rod turns over its width, for
+then the light on its sides changes."""
 
 POINTS = 121
 """Points of a measured centreline."""
@@ -77,6 +83,7 @@ def _uncalibrated(refined: Refined) -> Measurement:
         points=table,
         length_px=refined.tip.s,
         width_px=refined.typical_width,
+        blur_px=refined.blur,
         clamp_px=(float(points[0, 0]), float(points[0, 1])),
         tip_px=(float(points[-1, 0]), float(points[-1, 1])),
     )
@@ -140,7 +147,7 @@ def _in_frame(
     view = setting.view(camera, points, theta)
     heading, root = view.heading, told.root
     across = silhouette(view)
-    wall = np.abs(view.rise_across) * np.interp(s, grid.s, refined.width) / across
+    wall = view.rise_across * np.interp(s, grid.s, refined.width) / across
     own_sd_deg = _clamp_sd_deg(refined, np.interp(grid.s, s, wall), root, seen_in)
     angle_deg, sd_deg, flags = surer_direction(
         told, float(np.degrees(heading[0])), own_sd_deg
@@ -154,7 +161,7 @@ def _in_frame(
     kappa = np.gradient(heading + theta, s_mm[1])
     kappa -= np.interp(s, grid.s, grid.kappa) * view.along
     table = _pixel_columns(refined, s, points, theta)
-    doubt = side_face(seen_in) * wall
+    doubt = side_face(seen_in) * np.abs(wall)
     table["sigma_px"] = np.hypot(table["sigma_px"], doubt)
     table |= {
         "s_mm": s_mm,
@@ -177,6 +184,7 @@ def _in_frame(
         clamp_angle_sd_deg=sd_deg,
         length_px=float(s[-1] - s[0]),
         width_px=refined.typical_width,
+        blur_px=refined.blur,
         clamp_px=(float(points[0, 0]), float(points[0, 1])),
         tip_px=(float(points[-1, 0]), float(points[-1, 1])),
         pose=pose,
@@ -193,15 +201,21 @@ def _clamp_sd_deg(
 ) -> float:
     """Return the standard deviation of the direction at the clamp.
 
-    `wall` is how wide the side wall is seen, px.
+    `wall` is how wide the side wall is seen, px, positive on the left.
     """
     fit, width = refined.fit, float(refined.width[0])
-    bent = np.hypot(DRIFT_BENT * fit.curve.kappa * width, DRIFT_SHADE * refined.shaded)
+    facing, bent = (
+        (TURN_WALL, DRIFT_BENT) if is_dark(seen_in)
+        else (TURN_PALE_WALL, DRIFT_PALE_BENT)
+    )  # fmt: skip
+    drift = np.hypot(bent * fit.curve.kappa * width, DRIFT_SHADE * refined.shaded)
     white = DRIFT_WHITE * refined.saturated * refined.blur
-    facing = TURN_WALL if is_dark(seen_in) else TURN_PALE_WALL
+    both = sorted((fit.curve.kappa.max(), -fit.curve.kappa.min()))
+    free = BENT_BACK if both[0] > max(BACK * both[1], BENT / width) else 1.0
+    supple = SUPPLE * math.sqrt(fit.freedom / SUPPLE_FREEDOM)
     parts = (
-        SUPPLE * math.sqrt(fit.freedom / SUPPLE_FREEDOM) * fit.sigma_theta[0],
-        fit.turned(np.hypot(bent, white), DRIFT_REACH * width),
+        free * supple * fit.sigma_theta[0],
+        free * fit.turned(np.hypot(drift, white), DRIFT_REACH * width),
         TURN_SHADE * fit.lever @ refined.shaded,
         facing * fit.lever @ wall,
         root.sd * fit.curve.kappa[0],

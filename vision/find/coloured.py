@@ -62,6 +62,6 @@ def _tinted(photo: Photo) -> Binary | None:
     if cv2.countNonZero(mask) < _LEAST_COLOURED:
         return None
     return Binary(
-        ratio=1.0 - away, mask=mask, factor=factor, inverted=False, dark=0.0,
-        threshold=1.0 - _HUE,
+        ratio=np.asarray(1.0 - away, np.float32), mask=mask, factor=factor,
+        inverted=False, dark=0.0, threshold=1.0 - _HUE,
     )  # fmt: skip
