@@ -46,9 +46,12 @@ class Scene:
     past: Past | None = None
 
     @property
-    def room(self) -> float:
-        """How far a rod on the centre curve is from the wall, where it is narrowest."""
-        return max(float(np.min(self.tube.spans[:, 3, 0])) - self.half, 1e-4)
+    def narrow(self) -> float:
+        """Radius where the tube is narrowest.
+
+        Behind the wall by less, a point of the rod has its foot where it belongs.
+        """
+        return float(np.min(self.tube.spans[:, 3, 0]))
 
     @property
     def is_uniform(self) -> bool:

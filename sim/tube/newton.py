@@ -75,14 +75,14 @@ def newton(scene: Scene, turn: Turn, now: Round) -> tuple[int, bool, Look]:
         look = found
         if shift == 0.0 and size < CALM:
             return RESTED, True, look
-        if size > WILD and _behind(scene, look) > 0.1 * scene.room:
+        if size > WILD and _behind(scene, look) > 0.1 * scene.narrow:
             return BLIND, False, look
     return STUCK, False, look
 
 
 def _strays(scene: Scene, old: Look, new: Look) -> bool:
     """Tell whether a step is so long that it could pass a wall unseen."""
-    return float(np.max(np.abs(new.X - old.X))) > scene.room
+    return float(np.max(np.abs(new.X - old.X))) > scene.narrow
 
 
 def _behind(scene: Scene, look: Look) -> float:
