@@ -32,8 +32,8 @@ SMALL, CALM = 1e-11, 1e-7
 """
 WILD = 1e-3
 """Steps beyond this are looked at: they must not pass a wall."""
-BOLD = 1e-4
-"""Steps beyond this are worth a second one back to the wall."""
+BOLD, ARCS = 1e-4, 2
+"""Steps beyond this are worth a second one back to the wall; and so many tries."""
 TRACE, EASE = 1e-9, 1e-3
 """Part of bending that is always added; and most that is added while moments are out of
 balance, so that what costs nothing, as a turn about the axis of a straight tube, does
@@ -111,7 +111,7 @@ def _down(
     touches = now.touches
     before = touches.s.copy(), touches.p.copy()
     noise = 1e-13 * (1.0 + abs(look.total))
-    for _ in range(30):
+    for tries in range(30):
         enough = look.total + 1e-4 * share * slope + noise
         new = Look(scene, _by(look.turn, share * d), now)
         if size < CALM:
@@ -119,7 +119,7 @@ def _down(
         wild = share * size > WILD and _strays(scene, look, new)
         if new.total <= enough and not wild:
             return new
-        if share * size > BOLD and not wild:
+        if tries < ARCS and share * size > BOLD and not wild:
             solve(L, back := (1.0 - share) * g - slopes_of(scene, new, now).g)
             new = Look(scene, _by(new.turn, back), now)
             if new.total <= enough and not _strays(scene, look, new):

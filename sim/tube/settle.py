@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .linear import FIRST
 from .look import Look, Round, Scene, held, slopes_of
-from .newton import RESTED, STUCK, newton
+from .newton import BLIND, RESTED, STUCK, newton
 from .rod import Turn, within_magnet
 from .rub import Rubs, no_rubs, rubs_of
 from .touch import FLOATS, Seen, Touches, exchange, seen_of, sort_kinds
@@ -89,7 +89,8 @@ def settle(scene: Scene, turn: Turn, touches: Touches, soft: float) -> Rest:
     now = Round(touches, stiff, no_rubs())
     look = Look(scene, turn, now)
     _exchange(scene, look, touches)
-    for k in range(ROUNDS):
+    k = 0
+    for _ in range(3 * ROUNDS):
         seen = _seen(scene, look, touches)
         sort_kinds(scene.rod, seen, touches, free=k < PATIENCE, float_too=not stuck)
         now = Round(touches, stiff, _rubs(scene, touches, seen))
@@ -97,6 +98,9 @@ def settle(scene: Scene, turn: Turn, touches: Touches, soft: float) -> Rest:
         if not scene.is_uniform and within_magnet(scene.field, look.X):
             outcome = PULLED
             break
+        if end == BLIND:
+            deepest = _exchange(scene, look, touches)[1]
+            continue
         worst = float(np.max(abs(look.force - touches.force), initial=0.0)) / stiff
         touches.force = look.force
         changed = 0
@@ -119,6 +123,9 @@ def settle(scene: Scene, turn: Turn, touches: Touches, soft: float) -> Rest:
         if worst > 0.1 * before:
             stiff = min(HARD, 10.0 * stiff)
         before = worst
+        k += 1
+        if k == ROUNDS:
+            break
     rest = _rest(scene, look, touches, now, deepest)
     rest.outcome, rest.stable = outcome, stable
     return rest

@@ -221,7 +221,7 @@ def test_friction_in_a_winding_tube_is_the_capstans():
     With phi the angle by which it turns between its first and last contact: up to what
     its stiffness adds where it bends and straightens.
     """
-    rod, mu, tip_N = round_rod(26.0, 0.1, remanence_mT=100.0), 0.2, 0.01
+    rod, mu, tip_N = round_rod(26.0, 0.05, remanence_mT=100.0), 0.2, 0.01
     tube = Tube(
         name="half a turn", points_mm=helix(6.0, 10.0, 0.5, points=40), radius_mm=1.0,
         direction=(1.0, 0.0, 0.0),
@@ -248,7 +248,7 @@ def test_friction_in_a_winding_tube_is_the_capstans():
         inside = (step.s_mm >= first) & (step.s_mm <= last)
         phi = np.trapezoid(step.shape[6][inside], step.s_mm[inside])
         rope_N = tip_N * math.exp(way * mu * phi)
-        assert -step.push_N == pytest.approx(rope_N, rel=0.06)
+        assert -step.push_N == pytest.approx(rope_N, rel=0.07)
 
 
 LOAD_N_T = math.pi / 4.0 * 1e-6 * 0.1 / (4e-7 * math.pi)
