@@ -25,7 +25,7 @@ from ..tube.touch import TIP, Touches
 from ..tube.tube import Tube
 from ..tube.wall import Bore, gaps
 from .passage import Contact, Passage, Step
-from .walk import EASE, Walk
+from .walk import EASE, TURNED, Walk
 
 Array = NDArray[np.float64]
 
@@ -225,6 +225,8 @@ def at_rest(
     rest = settle(scene, turn, touches, soft)
     moved = trace(rod, rest.turn, rod.s)[:, :3] - guess[:, :3]
     outcome = rest.outcome if rest.stable or rest.outcome != SETTLED else -1
+    if outcome == SETTLED and _behind(case, rod, rest):
+        outcome = TURNED
     return outcome, TubeState(
         insertion_mm=insertion_mm,
         rod=rod,
@@ -233,6 +235,13 @@ def at_rest(
         energy=rest.energy,
         rubbed=rest.rubbed,
     )
+
+
+def _behind(case: TubeCase, rod: Rod, rest: Rest) -> bool:
+    """Tell whether a part of the rod lies beside its guide."""
+    path = trace(rod, rest.turn, rod.s)[:, :3]
+    feet = gaps(case.bore, path, 0.0, case.start)[1]
+    return bool(np.min(feet) < case.start - case.half)
 
 
 def _past(case: TubeCase, old: TubeState | None, insertion_mm: float) -> Past | None:

@@ -14,6 +14,7 @@ JAMMED = "jammed: no equilibrium found without passing a wall"
 PULLED_ON = "pulled onto the magnet: no equilibrium"
 LIMIT = "push force beyond its limit"
 LOST = "no equilibrium found"
+TURNED_BACK = "turned back behind the guide, where it has no room"
 OVERPOWERED = "no equilibrium found: the magnet pulls more than rod and walls hold"
 
 

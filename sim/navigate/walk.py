@@ -21,6 +21,7 @@ from .passage import (
     LOST,
     OVERPOWERED,
     PULLED_ON,
+    TURNED_BACK,
     Event,
     Step,
 )
@@ -46,7 +47,9 @@ EASE = 1e-3
 """Friction is fully mobilised by a slip of this part of a step."""
 SOFTER = (1e2, 1e3, 1e4, 1e5)
 """Stiffness of the walls where a rod that snaps is to find its way past them."""
-WHY = {NO_ROOM: JAMMED, PULLED: PULLED_ON}
+TURNED = PULLED + 1
+"""Outcome of coming to rest, besides those of `settle`: behind the guide's end."""
+WHY = {NO_ROOM: JAMMED, PULLED: PULLED_ON, TURNED: TURNED_BACK}
 
 
 class AtRest(Protocol):

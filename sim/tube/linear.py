@@ -42,7 +42,7 @@ def _factored(H, L):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def factor(H, K, trace, L):  # type: ignore[no-untyped-def]
     """Factor H + (shift + trace) diag K; return the least shift tried that let it."""
     shift = added = 0.0
@@ -57,7 +57,7 @@ def factor(H, K, trace, L):  # type: ignore[no-untyped-def]
     return shift
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def solve(L, b):  # type: ignore[no-untyped-def]
     """Replace b by the solution of L L^T x = b, 0 at the clamp."""
     b[:FIRST] = 0.0
@@ -73,7 +73,7 @@ def solve(L, b):  # type: ignore[no-untyped-def]
             b[k] -= L[i, k] * b[i]
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc"})
 def add_points(H, A, weight, width):  # type: ignore[no-untyped-def]
     """Add A^T W A of points whose places depend on the first `width` unknowns.
 
@@ -94,7 +94,7 @@ def add_points(H, A, weight, width):  # type: ignore[no-untyped-def]
                     H[a, c] += f * A[k, i, c]
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc"})
 def add_dyads(H, rows, weight, width):  # type: ignore[no-untyped-def]
     """Add the dyads of rows, shape (k, n), of `width` each, times weights."""
     for k in range(rows.shape[0]):

@@ -116,7 +116,7 @@ def interpolated(old: Rod, turn: Turn, new: Rod, start: Array, ahead: float) -> 
     return turn
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _quaternions(rod, turn, s, out):  # type: ignore[no-untyped-def]
     """Fill quaternions of a rod at arc lengths, shape (m, 4), of any length."""
     v = np.empty(4)
@@ -125,7 +125,7 @@ def _quaternions(rod, turn, s, out):  # type: ignore[no-untyped-def]
         blend(turn, e, xi, out[k], v)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def trace_at(rod, turn, X, s, out):  # type: ignore[no-untyped-def]
     """Fill places, tangents and their derivatives, shape (m, 9)."""
     d, v = np.empty(4), np.empty(4)

@@ -194,7 +194,7 @@ def station(rod, turn, X, s, r, t, k, d, v):  # type: ignore[no-untyped-def]
     return e, xi
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def own_energy(rod, field, turn, X):  # type: ignore[no-untyped-def]
     """Fill the places of the nodes; return the energy of bending, magnet and weight."""
     nodes(rod, turn, X)
@@ -226,7 +226,7 @@ def own_energy(rod, field, turn, X):  # type: ignore[no-untyped-def]
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def within_magnet(field, X):  # type: ignore[no-untyped-def]
     """Tell whether a node is inside a source of the field."""
     for i in range(1, X.shape[0]):
@@ -244,7 +244,7 @@ def _times(q, v, out):  # type: ignore[no-untyped-def]
     out[3] = 0.5 * (q[0] * v[2] + q[1] * v[1] - q[2] * v[0])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def fill_inner(turn):  # type: ignore[no-untyped-def]
     """Fill the inner quaternions."""
     one, two = np.empty(4), np.empty(4)
@@ -256,7 +256,7 @@ def fill_inner(turn):  # type: ignore[no-untyped-def]
                 turn.c[e, a, i] = 0.5 * (one[i] + two[i])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def turned(turn, by, out):  # type: ignore[no-untyped-def]
     """Fill `out` with `turn`, turned by the unknowns `by`, shape (9 n + 3,)."""
     step = np.empty(4)

@@ -91,6 +91,8 @@ def settle(scene: Scene, turn: Turn, touches: Touches, soft: float) -> Rest:
     _exchange(scene, look, touches)
     k = 0
     for _ in range(3 * ROUNDS):
+        if k == ROUNDS:
+            break
         seen = _seen(scene, look, touches)
         sort_kinds(scene.rod, seen, touches, free=k < PATIENCE, float_too=not stuck)
         now = Round(touches, stiff, _rubs(scene, touches, seen))
@@ -105,11 +107,7 @@ def settle(scene: Scene, turn: Turn, touches: Touches, soft: float) -> Rest:
         touches.force = look.force
         changed = 0
         if worst < 1e-3 or end != RESTED:
-            changed = _strayed(touches)
-            if k < PATIENCE:
-                touches = touches.kept((touches.force > 0.0) | (look.seen.gap < GAP))
-            added, deepest = _exchange(scene, look, touches)
-            changed = changed + added if k < FROZEN else 0
+            touches, changed, deepest = _looked_over(scene, look, touches, k)
         if end == RESTED and not changed and worst < (GAP if k < FROZEN else LOOSE):
             outcome = SETTLED if deepest < TOO_DEEP else JAMMED
             break
@@ -124,11 +122,20 @@ def settle(scene: Scene, turn: Turn, touches: Touches, soft: float) -> Rest:
             stiff = min(HARD, 10.0 * stiff)
         before = worst
         k += 1
-        if k == ROUNDS:
-            break
     rest = _rest(scene, look, touches, now, deepest)
     rest.outcome, rest.stable = outcome, stable
     return rest
+
+
+def _looked_over(
+    scene: Scene, look: Look, touches: Touches, k: int
+) -> tuple[Touches, int, float]:
+    """Return the contacts after a round, how many are to change, the overlap."""
+    changed = _strayed(touches)
+    if k < PATIENCE:
+        touches = touches.kept((touches.force > 0.0) | (look.seen.gap < GAP))
+    added, deepest = _exchange(scene, look, touches)
+    return touches, changed + added if k < FROZEN else 0, deepest
 
 
 def _rest(

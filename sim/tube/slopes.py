@@ -153,7 +153,7 @@ def _carry(turn, e, B, ga, hb, W, g, H):  # type: ignore[no-untyped-def]
     second(turn, e, ga, H)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def assemble(rod, turn, loads, g, H, K):  # type: ignore[no-untyped-def]
     """Fill gradient, lower triangle of the Hessian, and the diagonal of bending's part.
 
@@ -244,7 +244,7 @@ def _spread(turn, e, xi, h, B, A, d, v, t):  # type: ignore[no-untyped-def]
                         A[i, u] += weight * B[a, j, u]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def places(rod, turn, element, xi, A, T):  # type: ignore[no-untyped-def]
     """Fill the derivatives of places and tangents of points of the rod.
 
@@ -290,7 +290,7 @@ def places(rod, turn, element, xi, A, T):  # type: ignore[no-untyped-def]
                                 T[k, i, at + u] += f[a] * grad[j] * B[a, j, u]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def press(rod, turn, element, xi, force, g, H):  # type: ignore[no-untyped-def]
     """Add what forces on points do within their own elements.
 

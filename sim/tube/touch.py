@@ -120,7 +120,7 @@ def _look(rod, turn, X, tube, half, s, p, r, t, k, d, v, C, grad, hess):  # type
     return gap, first, second, p, e, xi
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def locate(rod, turn, X, tube, half, s, kind, p, home, room, seen):  # type: ignore[no-untyped-def]
     """Bring contacts up to date: floating ones move to where the rod is nearest.
 
@@ -173,7 +173,7 @@ def seen_of(
     return seen
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def survey(rod, turn, X, tube, half, p):  # type: ignore[no-untyped-def]
     """Return arc lengths, gaps and feet all along the rod, shape (3, LOOKS n + 1)."""
     n = rod.m.shape[0]

@@ -125,7 +125,7 @@ def wall_at(tube, x, half, p, C, grad, hess):  # type: ignore[no-untyped-def]
     return gap, p
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def gaps(tube, points, half, p):  # type: ignore[no-untyped-def]
     """Return gaps and feet of points, shape (2, n), the first foot sought near p."""
     C = np.empty((4, 4))

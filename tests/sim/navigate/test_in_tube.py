@@ -340,6 +340,15 @@ def test_a_rod_pushed_from_its_tip_winds_into_a_torsion_free_helix():
     assert sum(inside) / 12.0 == pytest.approx(bears, rel=1e-2)
 
 
+def test_a_rod_that_turns_back_beside_its_guide_is_named():
+    soft = round_rod(20.0, 0.05, remanence_mT=100.0)
+    wide = Tube(name="wide", points_mm=[(0, 0, 0), (40, 0, 0)], radius_mm=2.0)
+    back = UniformField(flux_mT=200.0, angle_deg=175.0)
+    passage = navigate(soft, wide, back, refine=False)
+    assert passage.outcome == "turned back behind the guide, where it has no room"
+    assert min(step.shape[0].min() for step in passage.steps) > -0.6
+
+
 def test_a_rod_snaps_on_and_snaps_back_later():
     """Where the tube widens the tip leaves the wall, and returns late on the way."""
     points = [
