@@ -37,6 +37,9 @@ def fit(
         None, "--out", help="fit.json; in the first run folder if not given."
     ),
     field: str = typer.Option("magnet", "--field", help="magnet or uniform."),
+    magnet: Path = typer.Option(
+        None, "--magnet", help="Source file instead of the magnet of the runs."
+    ),
     model: str = typer.Option("rod", "--model", help="rod or solid."),
     free: list[str] = typer.Option(
         [],
@@ -86,7 +89,7 @@ def fit(
         write_fit,
     )
     from ..core.derived import note_derived
-    from ..sim import Support
+    from ..sim import Support, read_field
 
     choice(field, ("magnet", "uniform"), "--field")
     choice(model, ("rod", "solid"), "--model")
@@ -95,6 +98,7 @@ def fit(
     nuisance = _nuisance(hold, prior)
     if posterior:
         check_installed()
+    sources = read_field(magnet) if magnet is not None else None
     loaded, left_out = loaded_runs(runs, unverified=unverified)
     path = out or loaded[0].path / "fit.json"
     outputs(path)
@@ -110,6 +114,7 @@ def fit(
         prior_MPa=range_MPa,
         bounds_MPa=bounds_MPa,
         falling=falling,
+        sources=sources,
     )
     sampled = None
     if posterior:
@@ -119,6 +124,8 @@ def fit(
             )
     write_fit(path, result, sampled)
     used = [file for run in loaded for file in run.files]
+    if magnet is not None:
+        used.append(magnet)
     note_derived([path], sources=used, command="analysis fit")
     data = result.as_dict()
     if sampled is not None:

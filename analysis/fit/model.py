@@ -15,6 +15,7 @@ from ...core.cross_section import ALL_SIZES
 from ...core.errors import InputError
 from ...core.specimen import Section, Specimen
 from ..compare.metrics import position_at
+from .fields import field_at, flux_at_tip_mT, is_read, strength
 from .nuisance import Owner
 from .problem import Datum, Problem, Shot
 
@@ -53,16 +54,14 @@ def solved_mm(
     problem: Problem, shot: Shot, specimen: Specimen, values: Values
 ) -> Array | None:
     """Return the points of a rod in the field of a shot, as `shape_of` does."""
-    field = _field_of(shot.field, values)
-    if problem.model == "uniform" and isinstance(field, sim.MagnetField):
-        field = sim.UniformField(
-            flux_mT=tip_flux_mT(field, shot.specimen.length_mm),
-            angle_deg=field.magnet.axis_angle_deg,
-        )
+    field = field_at(shot.field, shot.gap_mm, values)
+    if problem.model == "uniform" and not is_read(shot.field):
+        flux_mT, angle_deg = flux_at_tip_mT(field, shot.specimen.length_mm)
+        field = sim.UniformField(flux_mT=flux_mT, angle_deg=angle_deg)
     # Only a straight rod can be solved as a solid.
     solid = problem.model == "solid" and specimen.is_plain
     shape = sim.solve(
-        specimen, field, support=_support_of(problem, values),
+        specimen, field, support=_support_of(problem, shot, values),
         model="solid" if solid else "rod", points=241,
     ).centreline  # fmt: skip
     if shape is None:
@@ -139,19 +138,11 @@ def stated(datum: Datum, values: Values) -> float:
         return scale * side_mm * (1.0 + values.get("side_percent", 0.0) / 100.0)
     if datum.field is None:
         raise InputError(f"a datum of {datum.kind} needs the field it was read in")
-    field = _magnet_of(datum.field, values)
+    field = field_at(datum.field, datum.gap_mm, values)
     gain = 1.0 + values.get("meter_percent", 0.0) / 100.0
-    flux_mT = tip_flux_mT(field, datum.specimen.length_mm)
+    gain *= strength(datum.field, values)
+    flux_mT, _ = flux_at_tip_mT(field, datum.specimen.length_mm)
     return gain * flux_mT + values.get("meter_offset_mT", 0.0)
-
-
-def tip_flux_mT(field: sim.MagnetField, length_mm: float) -> float:
-    """Return the flux density at the undeformed tip, where the meter reads it."""
-    tip = np.array([[length_mm, 0.0, 0.0]])
-    flux = sim.magnet_flux_mT(
-        field.magnet, tip, length_mm=length_mm, gap_mm=field.gap_mm
-    )
-    return float(np.linalg.norm(flux[0]))
 
 
 def rod_of(nominal: Specimen, values: Values) -> Specimen:
@@ -221,37 +212,11 @@ def _graded(rod: Specimen, share: float) -> Specimen:
     return replace(rod, sections=tuple(pieces))
 
 
-def _magnet_of(field: sim.MagnetField, values: Values) -> sim.MagnetField:
-    magnet = field.magnet
-    factor = 1.0 + values.get("magnet_percent", 0.0) / 100.0
-    if "magnet_remanence_T" in values:
-        factor *= values["magnet_remanence_T"] / magnet.remanence_T
-    x, y, z = magnet.offset_mm
-    return sim.MagnetField(
-        magnet=replace(
-            magnet,
-            remanence_T=magnet.remanence_T * factor,
-            offset_mm=(x + values.get("magnet_offset_mm", 0.0), y, z),
-        ),
-        gap_mm=field.gap_mm + values.get("gap_mm", 0.0),
-    )
-
-
-def _field_of(
-    field: sim.UniformField | sim.MagnetField, values: Values
-) -> sim.UniformField | sim.MagnetField:
-    if isinstance(field, sim.MagnetField):
-        return _magnet_of(field, values)
-    # A uniform field is known by its reading alone.
-    true_mT = field.flux_mT - values.get("meter_offset_mT", 0.0)
-    true_mT /= 1.0 + values.get("meter_percent", 0.0) / 100.0
-    return replace(field, flux_mT=true_mT)
-
-
-def _support_of(problem: Problem, values: Values) -> sim.Support:
+def _support_of(problem: Problem, shot: Shot, values: Values) -> sim.Support:
     base = problem.support
+    factor = values.get("load_factor", base.load_factor)
     return replace(
         base,
         clamp_angle_deg=base.clamp_angle_deg + values.get("clamp_angle_deg", 0.0),
-        load_factor=values.get("load_factor", base.load_factor),
+        load_factor=factor * strength(shot.field, values),
     )

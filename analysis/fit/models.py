@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from ... import sim
+from .fields import is_read
 from .problem import MODELS
 from .records import ModelFit, Suspect
 from .result import FitResult
@@ -20,7 +20,7 @@ def compare_models(result: FitResult, limits: Limits) -> tuple[ModelFit, ...]:
     """
     found = [_of(result)]
     shots = result.problem.shots
-    if all(isinstance(shot.field, sim.MagnetField) for shot in shots):
+    if not any(is_read(shot.field) for shot in shots):
         for model in MODELS:
             if model != result.model:
                 other = replace(result.problem, model=model)

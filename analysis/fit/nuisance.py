@@ -116,10 +116,12 @@ class Nuisance:
             return self.frame_angle_deg
         return stated_deg if math.isfinite(stated_deg) else FRAME_ANGLE_SD_DEG
 
-    def magnet_sd_percent(self, magnet: Magnet) -> float:
-        """Return the prior of a magnet, with what the rig file states."""
+    def magnet_sd_percent(self, magnet: Magnet | None) -> float:
+        """Return the prior of a magnet, as the rig file states it, or of sources."""
         if self.magnet_percent is not None:
             return self.magnet_percent
+        if magnet is None:
+            return MAGNET_PERCENT
         return _percent(magnet.remanence_sd_T, magnet.remanence_T, MAGNET_PERCENT)
 
     def of_rod(self, specimen: Specimen) -> dict[str, float]:

@@ -18,8 +18,9 @@ from ... import sim
 from ...core.centreline import Centreline
 from ...core.errors import InputError, SolverError, StoreError
 from ...core.specimen import Specimen
-from ..compare.compare import field_of, frame_problem, usable_flux
+from ..compare.compare import frame_problem, usable_flux
 from ..runs.data import RunData, Step
+from .fields import field_in, is_read, remanence_T
 from .noise import FLOOR_MM, mode_matrix, spectrum, stated_mm
 from .nuisance import Nuisance, Owner, scope_of
 
@@ -79,7 +80,8 @@ class Shot:
     owner: Owner
     label: str
     specimen: Specimen
-    field: sim.UniformField | sim.MagnetField
+    field: sim.Field
+    gap_mm: float
     line: Centreline
     normals: Array
     sigma_mm: Array
@@ -113,7 +115,8 @@ class Datum:
     value: float
     sd: float
     specimen: Specimen
-    field: sim.MagnetField | None = None
+    field: sim.Field | None = None
+    gap_mm: float = math.nan
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,7 +157,7 @@ class Problem:
         if name == "load_factor":
             return self.support.load_factor
         field = self.shots[0].field
-        return field.magnet.remanence_T if isinstance(field, sim.MagnetField) else 1.0
+        return 1.0 if is_read(field) else remanence_T(field)
 
     def held_by(self, owner: Owner) -> list[tuple[int, str]]:
         """Return index and name of the unknowns that something of `owner` feels."""
@@ -196,6 +199,7 @@ def build_problem(
     free: Sequence[str] = (),
     nuisance: Nuisance | None = None,
     support: sim.Support | None = None,
+    sources: sim.Field | None = None,
 ) -> Problem:
     """Collect the shots of one or several runs of the same material.
 
@@ -212,6 +216,9 @@ def build_problem(
         Priors of the nuisance parameters.
     support : Support, optional
         Nominal clamp angle, weight and load factor.
+    sources : Field, optional
+        What the rods stood before, instead of the magnets of the runs; those that wait
+        for a gap stand at that of the step.
 
     Raises
     ------
@@ -223,13 +230,13 @@ def build_problem(
     nuisance = nuisance or Nuisance()
     support = support or common_support(runs)
     _check(runs, model, free, support)
-    shots, data, skipped = _collect(runs, model)
+    shots, data, skipped = _collect(runs, model, sources)
     if not shots:
         raise StoreError(f"no step can be fitted; the first: {skipped[0]}")
     held = {_FREED[name]: 0.0 for name in free if name in _FREED}
     if not any(support.gravity_m_s2):
         held["density_percent"] = 0.0
-    priors = _priors(runs, shots, replace(nuisance, **held))
+    priors = _priors(runs, shots, replace(nuisance, **held), sources)
     sections = range(len(runs[0].specimen.sections))
     return Problem(
         specimen=runs[0].specimen,
@@ -316,19 +323,20 @@ def _check(
 
 
 def _collect(
-    runs: Sequence[RunData], model: str
+    runs: Sequence[RunData], model: str, sources: sim.Field | None
 ) -> tuple[list[Shot], list[Datum], list[str]]:
     shots: list[Shot] = []
     data: list[Datum] = []
     skipped: list[str] = []
     rods = _firsts([run.specimen for run in runs])
-    benches = _firsts([run.magnet for run in runs])
+    benches = _firsts([sources or run.magnet for run in runs])
     for index, run in enumerate(runs):
         nobody = Owner(-1, -1, index, rods[index], benches[index])
         first = len(shots)
         frames: dict[str, int] = {}
         for step in run.steps:
-            found = _shot(run, step, model, nobody._replace(photograph=len(shots)))
+            field = field_in(run, step, model, sources)
+            found = _shot(run, step, field, nobody._replace(photograph=len(shots)))
             if isinstance(found, str):
                 skipped.append(f"{run.label}, step {step.index + 1}: {found}")
                 continue
@@ -336,7 +344,7 @@ def _collect(
             clamp = seen.shared_clamp if seen else ""
             frame = frames.setdefault(clamp, len(shots)) if clamp else len(shots)
             shots.append(replace(found, owner=found.owner._replace(frame=frame)))
-        data += _readings(run, nobody)
+        data += _readings(run, model, sources, nobody)
         if len(shots) > first:
             data += _sizes(run, nobody)
     return shots, data, skipped
@@ -347,12 +355,9 @@ def _firsts(things: Sequence[object]) -> list[int]:
     return [list(things).index(thing) for thing in things]
 
 
-def _shot(run: RunData, step: Step, model: str, owner: Owner) -> Shot | str:
+def _shot(run: RunData, step: Step, field: sim.Field | str, owner: Owner) -> Shot | str:
     frame = run.frame(step)
     problem = frame_problem(frame, run.specimen)
-    # Where a magnet is known, `uniform` is its flux at the tip, taken everywhere.
-    known = "magnet" if run.magnet or model != "uniform" else "uniform"
-    field = field_of(step, known, run.magnet)
     if problem or isinstance(field, str):
         return problem or str(field)
     if frame is None or frame.centreline is None:
@@ -364,6 +369,7 @@ def _shot(run: RunData, step: Step, model: str, owner: Owner) -> Shot | str:
         label=f"{run.label}, step {step.index + 1}",
         specimen=run.specimen,
         field=field,
+        gap_mm=step.gap_mm,
         line=line,
         normals=np.column_stack([-np.sin(line.theta_rad), np.cos(line.theta_rad)]),
         sigma_mm=stated,
@@ -375,18 +381,18 @@ def _shot(run: RunData, step: Step, model: str, owner: Owner) -> Shot | str:
     )
 
 
-def _readings(run: RunData, owner: Owner) -> list[Datum]:
-    if run.magnet is None:
-        return []
+def _readings(
+    run: RunData, model: str, sources: sim.Field | None, owner: Owner
+) -> list[Datum]:
     data = []
     for step in run.steps:
-        if usable_flux(step):
+        field = field_in(run, step, model, sources)
+        if usable_flux(step) and not isinstance(field, str) and not is_read(field):
             own = step.flux_sd_mT if math.isfinite(step.flux_sd_mT) else 0.0
             sd = math.hypot(own, READING_PERCENT / 100.0 * step.flux_mT)
-            field = sim.MagnetField(magnet=run.magnet, gap_mm=step.gap_mm)
             data.append(
                 Datum(kind="flux_mT", owner=owner, value=step.flux_mT, sd=sd,
-                      specimen=run.specimen, field=field)
+                      specimen=run.specimen, field=field, gap_mm=step.gap_mm)
             )  # fmt: skip
     return data
 
@@ -407,7 +413,10 @@ def _sizes(run: RunData, owner: Owner) -> list[Datum]:
 
 
 def _priors(
-    runs: Sequence[RunData], shots: Sequence[Shot], nuisance: Nuisance
+    runs: Sequence[RunData],
+    shots: Sequence[Shot],
+    nuisance: Nuisance,
+    sources: sim.Field | None,
 ) -> dict[tuple[str, int], float]:
     """Return the standard deviation of every nuisance that is not held."""
     priors: dict[tuple[str, int], float] = {}
@@ -420,11 +429,12 @@ def _priors(
         sds |= nuisance.of_rod(shot.specimen)
         if owner.frame == owner.photograph:
             sds["frame_angle_deg"] = nuisance.frame_sd_deg(shot.frame_sd_deg)
-        if run.magnet is not None:
-            sds["magnet_percent"] = nuisance.magnet_sd_percent(run.magnet)
+        if not is_read(shot.field):
+            magnet = None if sources else run.magnet
+            sds["magnet_percent"] = nuisance.magnet_sd_percent(magnet)
         for name in ("meter_percent", "meter_offset_mT", "gap_mm"):
             sds[name] = getattr(nuisance, name)
-        if isinstance(shot.field, sim.MagnetField):
+        if shot.field.follows_gap:
             sds["magnet_offset_mm"] = nuisance.magnet_offset_mm
         for name, sd in sds.items():
             if sd > 0.0:

@@ -17,6 +17,7 @@ from ... import sim
 from ...core.errors import MagbendError
 from ...core.units import GRAVITY_M_PER_S2
 from ..runs.data import RunData
+from .fields import field_at
 from .linear import covariance_of
 from .model import rod_of, values_of
 from .noise import mode_matrix
@@ -149,8 +150,7 @@ def _photographs(result: FitResult, runs: Sequence[RunData]) -> Iterator[Proposa
     """Try more photographs of the first run's rod."""
     problem = result.problem
     own = [shot for shot in problem.shots if shot.owner.run == 0]
-    fields = [shot.field for shot in own]
-    gaps = [field.gap_mm for field in fields if isinstance(field, sim.MagnetField)]
+    gaps = [shot.gap_mm for shot in own if shot.field.follows_gap]
     if not gaps:
         return
     tried: list[tuple[str, list[float], sim.Support, float]] = [
@@ -226,10 +226,10 @@ def _imagined(
     result: FitResult, model: Shot, gap_mm: float, index: int, support: sim.Support
 ) -> Shot | None:
     """Return the photograph of the fitted rod at another gap."""
-    if not isinstance(model.field, sim.MagnetField):
+    if not model.field.follows_gap:
         return None
     values = values_of(result.problem, model.owner, result.unknowns)
-    field = replace(model.field, gap_mm=gap_mm)
+    field = field_at(model.field, gap_mm, {})
     try:
         line = sim.solve(
             rod_of(model.specimen, values), field, support=support
@@ -244,7 +244,7 @@ def _imagined(
     return replace(
         model,
         owner=model.owner._replace(photograph=index, frame=frame),
-        field=field,
+        gap_mm=gap_mm,
         line=line,
         normals=np.column_stack([-np.sin(line.theta_rad), np.cos(line.theta_rad)]),
         sigma_mm=np.full(count, float(np.median(model.sigma_mm))),

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import sim
+from .fields import is_read
 from .model import VIEW, across_mm, shape_of, stated, values_of
 from .problem import Datum, Problem, Shot
 
@@ -92,7 +92,7 @@ def line_rows(problem: Problem, shot: Shot, unknowns: Array) -> tuple[Array, Arr
     here = across_mm(shot, values, middle)
     to_rows = shot.modes / shot.row_sd_mm[:, None]
     for k, name in problem.held_by(shot.owner):
-        if name in METER and isinstance(shot.field, sim.MagnetField):
+        if name in METER and not is_read(shot.field):
             continue
         moved = values | {name: problem.value(k, float(unknowns[k]) + STEP)}
         seen = middle if name in VIEW else shape_of(problem, shot, moved)

@@ -33,12 +33,13 @@ def fit_runs(
     falling: bool = False,
     prior_MPa: tuple[float, float] | None = None,
     judged: bool = True,
+    sources: sim.Field | None = None,
 ) -> FitResult:
     """Fit one set of moduli to all steps of one or several runs.
 
     Parameters
     ----------
-    runs, model, free, nuisance, support
+    runs, model, free, nuisance, support, sources
         See `build_problem`.
     bounds_MPa : tuple of float, optional
         Hard bounds of the moduli.
@@ -58,8 +59,9 @@ def fit_runs(
         If the search does not converge.
     """
     problem = build_problem(
-        runs, model=model, free=free, nuisance=nuisance, support=support
-    )
+        runs, model=model, free=free, nuisance=nuisance, support=support,
+        sources=sources,
+    )  # fmt: skip
     _check_sign(problem)
     limits = Limits(bounds_MPa=bounds_MPa, falling=falling, prior_MPa=prior_MPa)
     result = fit_problem(problem, limits)

@@ -169,10 +169,8 @@ def draw_pull_in(file: File, found: PullIn, *, title: str) -> None:
         lines = axes.contour(found.x, found.y, gap, colors="white", linewidths=0.8)
         axes.clabel(lines, fontsize=7, fmt="%g")
     figure.colorbar(mesh, ax=axes, label="pull-in gap in mm")
-    for name, label in zip(
-        found.names, (axes.set_xlabel, axes.set_ylabel), strict=True
-    ):
-        what, unit = name.rsplit("_", 1)
-        label(f"{what} in {unit}")
+    x, y = (" in ".join(name.rsplit("_", 1)) for name in found.names)
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
     axes.set_title(f"{title} (grey: not pulled in down to {low:g} mm)", fontsize=9)
     save(figure, file)

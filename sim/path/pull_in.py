@@ -11,6 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -165,5 +166,7 @@ def _with(rod: Specimen, name: str, value: float) -> Specimen:
             for one in rod.sections
         )
         return replace(rod, sections=sections)
-    sections = tuple(replace(one, **{name: None}) for one in rod.sections)
-    return replace(rod, sections=sections, **{name: value})
+    own: dict[str, Any] = {name: None}
+    common: dict[str, Any] = {name: value}
+    sections = tuple(replace(one, **own) for one in rod.sections)
+    return replace(rod, sections=sections, **common)

@@ -19,7 +19,6 @@ from magbend import sim
 from magbend.core.magnet import Magnet
 from magbend.core.specimen import Specimen
 from magbend.core.specimen_file import specimen_dict
-from magbend.sim import magnet_flux_mT
 
 MAGNET = Magnet.cube(55.0, 1.3)
 GAPS_MM = (70.0, 60.0, 50.0)
@@ -46,12 +45,13 @@ def write_run(
     reach_mm: float = 1.0,
     clamp_angle_sd_deg: float = math.nan,
     shared_clamp: str = "",
+    sources: sim.Field | None = None,
 ) -> Path:
     """Write a run folder whose true rod is `truth`, and return it.
 
-    `frame_error` is the standard deviation of clamp position (mm), of the frame's
-    angle (deg) and of the scale (relative). Errors of neighbours are alike over
-    `reach_mm`.
+    `sources` stand in for the magnet, in truth. `frame_error` is the standard deviation
+    of clamp position (mm), of the frame's angle (deg) and of the scale (relative).
+    Errors of neighbours are alike over `reach_mm`.
     """
     specimen = specimen or sim.gmc(2)
     truth = truth or specimen
@@ -65,19 +65,15 @@ def write_run(
         data = image or b""
         if image:
             (path / "images" / name).write_bytes(data)
-        flux = magnet_flux_mT(
-            magnet,
-            np.array([[truth.length_mm, 0.0, 0.0]]),
-            length_mm=truth.length_mm,
-            gap_mm=gap_mm,
-        )[0]
+        field = (sources or sim.before(magnet)).at_gap(gap_mm)
+        L = truth.length_mm
+        flux = sim.flux_mT(field, [L, 0.0, 0.0], length_mm=L)
         reading = float(np.linalg.norm(flux)) + flux_noise_mT * rng.standard_normal()
         steps.append(_step(index, gap_mm, reading, name, data, index in overload))
         if index in failed:
             frames.append({"image": name, "status": "failed", "flags": "no_rod",
                            "reason": "no rod was found"})  # fmt: skip
             continue
-        field = sim.MagnetField(magnet=magnet, gap_mm=gap_mm)
         line = sim.solve(truth, field, support=support, points=points).centreline
         assert line is not None
         xy, theta = _seen(

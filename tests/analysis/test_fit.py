@@ -84,6 +84,41 @@ def test_a_magnet_that_stands_farther_than_stated_is_in_the_interval(
     assert abs(free.E_MPa[0] / 20.0 - 1.0) < 0.3 * abs(held.E_MPa[0] / 20.0 - 1.0)
 
 
+def test_a_rod_before_any_sources_is_fitted_in_their_field(tmp_path: Path) -> None:
+    sources = sim.Field(
+        sim.Cylinder(diameter_mm=45.0, length_mm=40.0, remanence_T=1.3),
+        sim.Uniform(flux_mT=-6.0),
+    )
+    rod = sim.gmc(2)
+    moduli = (21.5, 14.1, 10.7)
+    truth = replace(
+        rod,
+        sections=tuple(
+            replace(one, E_MPa=E) for one, E in zip(rod.sections, moduli, strict=True)
+        ),
+    )
+    run = load_run(write_run(tmp_path / "a", truth=truth, sources=sources))
+    found = fit_runs([run], nuisance=HELD, sources=sources, judged=False)
+    np.testing.assert_allclose(found.E_MPa, moduli, rtol=2e-3)
+    free = fit_runs([run], sources=sources, judged=False)
+    assert {"magnet_percent", "magnet_offset_mm"} <= {n["name"] for n in free.nuisance}
+    assert np.all(np.abs(np.array(free.E_MPa) - moduli) < free.E_sd_MPa)
+    other = fit_runs([run], nuisance=HELD, judged=False)
+    assert abs(other.E_MPa[0] / moduli[0] - 1.0) > 0.05
+    with pytest.raises(InputError, match="one magnet alone"):
+        fit_runs([run], free=["magnet_remanence_T"], sources=sources)
+
+
+def test_two_halves_of_a_magnet_fit_as_the_magnet(tmp_path: Path) -> None:
+    run = load_run(write_run(tmp_path / "a"))
+    half = sim.Cuboid(sides_mm=(55.0, 55.0, 27.5), remanence_T=1.3)
+    behind = replace(half, offset_mm=(0.0, -27.5, 0.0))
+    one = fit_runs([run], judged=False)
+    two = fit_runs([run], sources=sim.Field(half, behind), judged=False)
+    np.testing.assert_allclose(two.E_MPa, one.E_MPa, rtol=1e-6)
+    np.testing.assert_allclose(two.E_sd_MPa, one.E_sd_MPa, rtol=1e-5)
+
+
 @pytest.mark.slow
 def test_intervals_hold_on_photographs(tmp_path: Path) -> None:
     """Rendered, calibrated and measured: nothing of the lines' errors is made up."""
