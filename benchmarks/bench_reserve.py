@@ -1,15 +1,16 @@
 """Errors on strangers' benches: scenes drawn at random, none of them tuned on.
 
     python benchmarks/bench_reserve.py [--count 200] [--seed 9001] [--page DIR]
-    python benchmarks/bench_reserve.py --kind blur --count 100 --seed 9101
+    python benchmarks/bench_reserve.py --kind blur --count 100 --seed 9101 [--peers]
 
 Seeds below 1000 are for work on the code; quoted figures come from seeds of 9000 and
 above that nobody looked at before. Prints, by difficulty: how many were measured,
 needless refusals, those wrong without a flag (RMS above 0.15 mm or tip above 0.5 mm),
 errors in mm, and the direction's pull in stated deviations; then how many right
 ones are doubted. ``--kind`` draws one kind only, and prints it by what was drawn (of
-blur: defocus, motion, grain, gloss, exposure). ``--page`` draws overlays of the refused
-and of the ten worst.
+blur: defocus, motion, grain, gloss, exposure). ``--page`` writes a page (index.html)
+with overlays of the ten worst and of the refused. ``--peers`` measures the same scenes
+with scikit-image and skan, whose masks are given to them (`reserve_peers`).
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from reserve_peers import of_peers
 from reserve_scenes import KINDS, Case, draw_case
 
 from magbend.vision import Measurement, draw_overlay, extract, specimen_to_px
@@ -55,6 +57,17 @@ class Row:
     @property
     def doubted(self) -> bool:
         return bool(DOUBTS & set(self.found.flags))
+
+    @property
+    def title(self) -> str:
+        return f"{self.case.photo.source} {self.case.words}"
+
+    @property
+    def told(self) -> str:
+        flags = ",".join(self.found.flags)
+        if not self.found.ok:
+            return f"refused: {self.found.reason} [{flags}]"
+        return f"RMS {self.rms:.4f} tip {self.tip:.4f} z {self.pull:+.1f} [{flags}]"
 
     @property
     def silent(self) -> bool:
@@ -150,18 +163,45 @@ def coverage(rows: list[Row]) -> str:
     )
 
 
+def peers_table(rows: list[Row], peers: list[dict[str, tuple[float, float]]]) -> str:
+    """Return what ours and peers make of the same scenes; lost ones are wrong."""
+    names = ("ours", *peers[0])
+    lines = [f"{'kind':10}" + "".join(f"{name:>32}" for name in names)]
+    lines.append(f"{'':10}" + len(names) * f"{'RMS mm':>12}{'tip mm':>10}{'wrong':>10}")
+    for kind in (*KINDS, "all"):
+        chosen = [i for i, row in enumerate(rows) if kind in (row.case.kind, "all")]
+        ours = [(rows[i].rms, rows[i].tip) for i in chosen]
+        cells = ""
+        for name in names:
+            errors = np.array(
+                ours if name == "ours" else [peers[i][name] for i in chosen]
+            )
+            errors = np.where(np.isfinite(errors), errors, np.inf)
+            wrong = (errors[:, 0] > WRONG_RMS_MM) | (errors[:, 1] > WRONG_TIP_MM)
+            rms, tip = np.median(errors, axis=0)
+            cells += f"{rms:12.4f}{tip:10.4f}{wrong.sum():7} / {len(chosen)}"
+        lines.append(f"{kind:10}{cells}")
+    return "\n".join(lines)
+
+
 def write_page(rows: list[Row], folder: Path) -> None:
-    """Draw the refused and the ten worst, with the true axis as a thin red line."""
+    """Write a page of the ten worst and of the refused, true axes as thin red lines."""
     folder.mkdir(parents=True, exist_ok=True)
     refused = [row for row in rows if not row.found.ok]
     worst = sorted((row for row in rows if row.found.ok), key=lambda row: -row.tip)[:10]
+    body = ["<h1>The ten worst, and the refused</h1>"]
     for rank, row in enumerate([*worst, *refused]):
         picture = draw_overlay(row.case.photo, row.found, max_side_px=1600)
         pose, line = row.case.scene.clamp.pose, row.case.scene.centreline
         true = specimen_to_px(row.case.camera, pose, line.points_mm)
         corners = np.round(true * 16).astype(np.int32).reshape(-1, 1, 2)
         cv2.polylines(picture, [corners], False, (0, 0, 255), 1, cv2.LINE_AA, shift=4)
-        cv2.imwrite(str(folder / f"{rank:02}_{row.case.photo.source}.png"), picture)
+        name = f"{rank:02}_{row.case.photo.source}.png"
+        cv2.imwrite(str(folder / name), picture)
+        body.append(f'<h2>{row.title}</h2><p>{row.told}</p><img src="{name}">')
+    style = "body {font: 16px sans-serif; margin: 2em} img {width: 100%}"
+    text = f'<meta charset="utf-8"><title>Worst</title><style>{style}</style>'
+    (folder / "index.html").write_text(text + "\n".join(body), encoding="utf-8")
 
 
 def main() -> int:
@@ -171,25 +211,24 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=9001)
     parser.add_argument("--kind", choices=KINDS, help="this kind of scene only")
     parser.add_argument("--page", type=Path, help="folder for overlays")
+    parser.add_argument("--peers", action="store_true", help="measure with peers too")
     parser.add_argument("--quiet", action="store_true", help="the table alone")
     options = parser.parse_args()
-    rows = []
+    rows, peers = [], []
     step = len(KINDS) if options.kind else 1
     first = KINDS.index(options.kind) if options.kind else options.first
     for index in range(first, first + step * options.count, step):
         row = measured(draw_case(options.seed, index))
         rows.append(row)
+        if options.peers:
+            peers.append(of_peers(row.case))
         if not options.quiet:
-            what = (
-                f"RMS {row.rms:.4f} tip {row.tip:.4f} z {row.pull:+.1f}"
-                if row.found.ok
-                else f"refused: {row.found.reason}"
-            )
-            flags = ",".join(row.found.flags)
-            print(f"{row.case.photo.source} {row.case.words}: {what} [{flags}]")
+            print(f"{row.title}: {row.told}")
     print(table(grouped(rows, options.kind)))
     print(coverage(rows))
     print(doubts(rows))
+    if peers:
+        print(peers_table(rows, peers))
     if options.page is not None:
         write_page(rows, options.page)
     return 1 if any(row.silent for row in rows) else 0
