@@ -114,7 +114,7 @@ class Kernel:
 
         Without a look by numba, whose import takes longer than a first solve.
         """
-        if self._compiled is not None:
+        if self._compiled is not None and self._compiled.signatures:
             return True
         code = self._function.__code__
         source = Path(os.environ.get("NUMBA_CACHE_DIR") or code.co_filename)

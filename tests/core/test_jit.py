@@ -161,3 +161,14 @@ def test_kernels_run_where_nothing_may_be_written(tmp_path: Path) -> None:
         check=True, capture_output=True, text=True,
     )  # fmt: skip
     assert done.stdout.strip() == "8.0 False"
+
+
+def test_a_kernel_that_was_only_looked_at_is_not_at_hand(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    kernel = jit.Kernel(lambda x: x + 1.0, {})
+    assert not kernel.is_stored
+    assert not kernel.is_at_hand  # else the next call would wait for the compiler
+    assert kernel(1.0) == 2.0
+    assert kernel.is_at_hand
