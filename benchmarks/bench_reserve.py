@@ -170,6 +170,8 @@ def peers_table(rows: list[Row], peers: list[dict[str, tuple[float, float]]]) ->
     lines.append(f"{'':10}" + len(names) * f"{'RMS mm':>12}{'tip mm':>10}{'wrong':>10}")
     for kind in (*KINDS, "all"):
         chosen = [i for i, row in enumerate(rows) if kind in (row.case.kind, "all")]
+        if not chosen:
+            continue
         ours = [(rows[i].rms, rows[i].tip) for i in chosen]
         cells = ""
         for name in names:
