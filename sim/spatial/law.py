@@ -132,9 +132,8 @@ def axis(rows, states, directors, curvature):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def solid_slope(p, y, f, Z, F):  # type: ignore[no-untyped-def]
-    """Write dy/dsigma into `f` and dZ/dsigma into `F`, as `march` does for a rod."""
-    v, H = np.empty(6), np.empty((7, 6))
+def solid_slope(p, y, f, v, H):  # type: ignore[no-untyped-def]
+    """Write dy/dsigma into `f`, as `march` does for a rod; `v` and `H` as `strains`."""
     strains(p, y, v, H)
     w0, w1, w2 = v[0], v[1], v[2]
     u0, u1, u2 = v[3], v[4], 1.0 + v[5]
@@ -149,12 +148,10 @@ def solid_slope(p, y, f, Z, F):  # type: ignore[no-untyped-def]
     f[9] = w1 * y[11] - w2 * y[10] + u1 * n2 - u2 * n1
     f[10] = w2 * y[9] - w0 * y[11] + u2 * n0 - u0 * n2
     f[11] = w0 * y[10] - w1 * y[9] + u0 * n1 - u1 * n0
-    if Z.shape[1] > 0:
-        _columns(y, v, H, Z, F)
 
 
 @njit(cache=True)
-def _columns(y, v, H, Z, F):  # type: ignore[no-untyped-def]
+def solid_columns(y, v, H, Z, F):  # type: ignore[no-untyped-def]
     """Write dZ/dsigma into `F` (12, columns), with `v` and `H` of `strains`."""
     w0, w1, w2 = v[0], v[1], v[2]
     u0, u1, u2 = v[3], v[4], 1.0 + v[5]

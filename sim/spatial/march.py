@@ -32,7 +32,7 @@ import numpy as np
 from ...core.jit import njit
 from ..magnet.flux import PART, flux_at, is_uniform
 from .across import POSITIVE, add_columns, add_state, look, recall
-from .law import SOLID_WIDTH, face_load, solid_slope
+from .law import SOLID_WIDTH, face_load, solid_columns, solid_slope
 
 H, C1, C2, C3, AXIAL, MU1, MU2, K1, K2, K3, WX, WY, WZ = range(13)
 WIDTH = 13
@@ -183,13 +183,12 @@ def _solid_slopes(k, blocks, w):  # type: ignore[no-untyped-def]
     """Write the slopes of stage k of a solid's state and columns."""
     y = w[LOOK : LOOK + STATE]
     f = w[SLOPE + ROW * k : SLOPE + ROW * k + STATE]
-    none = w[:0].reshape(12, 0)
-    if blocks == 0:
-        solid_slope(w, y, f, none, none)
+    v, H = np.empty(6), np.empty((7, 6))
+    solid_slope(w, y, f, v, H)
     for n in range(blocks):
         at, g = LOOK_Z + BLOCK * n, SLOPE_Z + BLOCK * (BLOCKS * k + n)
         columns = w[at : at + BLOCK].reshape(12, 6)
-        solid_slope(w, y, f, columns, w[g : g + BLOCK].reshape(12, 6))
+        solid_columns(y, v, H, columns, w[g : g + BLOCK].reshape(12, 6))
 
 
 @njit(**FAST)
