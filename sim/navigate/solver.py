@@ -11,11 +11,11 @@ from ...core.specimen import Specimen
 from ..fields import Support, check_case
 from ..tube.tube import Tube
 from .case import Case, FieldOfWay
+from .in_plane import PlanarWalk
 from .in_tube import SpatialPassage, TubeWalk, tube_case
 from .lumen import Lumen
 from .mesh import ELEMENTS, sections_of
 from .passage import Passage
-from .walk import PlanarWalk
 
 NO_SUPPORT = Support()
 MOST_STEPS = 20_000

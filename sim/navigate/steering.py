@@ -22,11 +22,11 @@ from ...core.specimen import Specimen
 from ..fields import Field
 from ..tube.tube import Tube
 from .case import FieldOfWay
+from .in_plane import PlanarWalk
 from .lumen import Gate, Lumen
 from .passage import Passage
 from .poses import KEYS, moving
 from .solver import navigate, planar_walk
-from .walk import PlanarWalk
 
 PRESS_MM_PER_MN = 1.0
 """How far off the tip may be for a milli-newton less on the walls."""
