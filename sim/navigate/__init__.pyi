@@ -11,6 +11,7 @@ from .figures import film as film
 from .files import lumen_of as lumen_of
 from .files import read_lumen as read_lumen
 from .files import read_poses as read_poses
+from .in_plane import crosses as crosses
 from .in_tube import SpatialContact as SpatialContact
 from .in_tube import SpatialPassage as SpatialPassage
 from .in_tube import SpatialStep as SpatialStep
@@ -29,4 +30,3 @@ from .steering import Steered as Steered
 from .steering import plan_of as plan_of
 from .steering import poses_text as poses_text
 from .steering import steer as steer
-from .walk import crosses as crosses
