@@ -222,6 +222,12 @@ def _print(data: dict[str, Any], passage: Passage) -> None:
             f"  snap            at {event.insertion_mm:.3f} mm: the rod moves "
             f"{event.moved_mm:.2f} mm and loses {event.released_Nmm:.3g} N mm"
         )
+    for event in passage.events:
+        if event.kind == "self-contact":
+            say(
+                f"  self-contact    at {event.insertion_mm:.3f} mm: {event.what}; "
+                "do not trust the way from there on"
+            )
     say(f"  overlap         {data['overlap_mm']:.1e} mm at most, between contacts")
     if "residual_Nmm" in data:
         say(f"  out of balance  {data['residual_Nmm']:.1e} N mm at most")

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from .case import Case
 from .lumen import Gate
 from .mesh import thirds, trace, unknowns
-from .passage import Step
-from .readout import loads, push_force, read_step
+from .passage import MEETS, Event, Step
+from .readout import loads, meets_itself, push_force, read_step
 from .rod import Rod
 from .settle import SETTLED, SOFT, settle
 from .touch import TIP, Before, Touches, no_touches
@@ -150,6 +150,19 @@ class PlanarWalk(Walk[Case, State]):
             length_mm=case.length_mm,
             unit_N=case.unit_N,
         )
+
+    def _notice(self, old: State | None, new: State, step: Step) -> None:
+        super()._notice(old, new, step)
+        known = any(event.kind == MEETS for event in self.events)
+        side_mm = 2.0 * self.case.half * self.case.length_mm
+        if not known and meets_itself(step, side_mm):
+            self.events.append(
+                Event(
+                    kind=MEETS,
+                    insertion_mm=new.insertion_mm,
+                    what="the rod meets itself, which does not keep it off",
+                )
+            )
 
     def _passed(self, before: Step, after: Step) -> list[str]:
         return [

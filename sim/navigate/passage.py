@@ -15,6 +15,7 @@ PULLED_ON = "pulled onto the magnet: no equilibrium"
 LIMIT = "push force beyond its limit"
 LOST = "no equilibrium found"
 TURNED_BACK = "turned back behind the guide, where it has no room"
+MEETS = "self-contact"
 OVERPOWERED = "no equilibrium found: the magnet pulls more than rod and walls hold"
 
 
@@ -109,10 +110,11 @@ class Event:
 
     Parameters
     ----------
-    kind : {"snap", "gate", "gate back", "touch"}
+    kind : {"snap", "gate", "gate back", "touch", "self-contact"}
         ``snap``: the rod left a state that ceased to be one (buckling, snap-through)
         for another. ``gate``: the tip passed a gate, or came back through it.
-        ``touch``: the first contact with a wall.
+        ``touch``: the first contact with a wall. ``self-contact``: the rod meets
+        itself for the first time; from there on it passes through itself.
     insertion_mm : float
         When.
     what : str

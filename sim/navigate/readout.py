@@ -104,6 +104,21 @@ def loads(
     return np.asarray(total + normal @ force - tangent @ rubbing[:n])
 
 
+def meets_itself(step: Step, side_mm: float) -> bool:
+    """Return whether parts of the rod are nearer to each other than its side.
+
+    Parts further along it than half the turn of a circle that wide, which are near by
+    being neighbours. A plane curve must turn by more than a right angle and a half
+    before it can come back to itself.
+    """
+    x, y, theta, _ = step.shape
+    if np.ptp(theta) < 0.75 * math.pi:
+        return False
+    apart = np.hypot(x[:, None] - x, y[:, None] - y)
+    far = np.abs(step.s_mm[:, None] - step.s_mm) > math.pi * side_mm
+    return bool((far & (apart < side_mm)).any())
+
+
 def read_step(
     insertion_mm: float,
     rod: Rod,

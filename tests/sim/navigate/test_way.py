@@ -192,6 +192,28 @@ def test_a_pushed_rod_buckles_outside_of_the_lumen():
     assert abs(last.shape[1]).max() > 0.1
 
 
+def test_a_rod_that_meets_itself_is_named_and_one_in_a_bend_is_not():
+    room = [(0, 0.6), (0, 8), (16, 8), (16, -8), (0, -8), (0, -0.6)]
+    closed = Lumen(
+        name="room", walls=(Wall("box", polyline(room)),), inside_mm=(1.0, 0.0),
+        entry_mm=(0.5, 0.0),
+    )  # fmt: skip
+    rod = Specimen(
+        name="soft", side_mm=1.0, remanence_mT=0.0,
+        sections=(Section(length_mm=75.0, E_MPa=1.0),),
+    )  # fmt: skip
+    passage = navigate(
+        rod, closed, NOTHING, way_mm=47.0, step_mm=1.0, elements=36, refine=False
+    )
+    met = [e for e in passage.events if e.kind == "self-contact"]
+    assert len(met) == 1
+    # Once round the room, and not before its length allows it.
+    assert 30.0 < met[0].insertion_mm < 47.0
+    turn = channel("turn", width_mm=2.5, legs=[(2.0, 0.0), (math.pi * 4.5, 180.0)])
+    around = navigate(gmc(2), turn, NOTHING, way_mm=15.0, refine=False)
+    assert all(event.kind != "self-contact" for event in around.events)
+
+
 def test_weight_across_the_lumen_is_refused():
     lumen = channel("tube", width_mm=3.0, legs=[(40.0, 0.0)])
     with pytest.raises(ValueError, match="a floor would carry it"):
