@@ -59,11 +59,6 @@ class OfCase(Protocol):
     """What a walk asks of its case; see `case.Case`."""
 
     @property
-    def field(self) -> object:
-        """A field, or a function of the insertion that returns it."""
-        ...
-
-    @property
     def tip(self) -> tuple[float, float, float] | None:
         """Where the tip is held."""
         ...
