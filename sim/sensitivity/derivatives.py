@@ -19,13 +19,15 @@ from ...core.checks import listed, shown
 from ...core.errors import InputError, SolverError
 from ...core.specimen import Specimen
 from ...core.units import rad_from_deg
-from ..fields import Field, Support, as_field, check_case, check_plain
+from ..fields import Field, Support, as_field, check_case
 from ..one_rod import NO_SUPPORT, solve
 from ..planar.solver import ORDER, STEP, solve_planar
 from ..scaling import field_array, rod_array, stations
 from ..solution import Solution
 from .march import parameter_columns
+from .moved import Case
 from .parameters import Change, change_of
+from .space import shape_changes
 
 Array = NDArray[np.float64]
 
@@ -42,8 +44,12 @@ class Sensitivities:
         Where.
     parameters : tuple of str
         With respect to what; the unit is the one in the name.
-    dx_mm, dy_mm, dtheta_rad : ndarray, shape (n, p)
-        Derivatives of x, y and the tangent angle, per unit of each parameter.
+    dx_mm, dy_mm, dz_mm, dtheta_rad : ndarray, shape (n, p)
+        Derivatives of x, y, z and the tangent angle (as seen from above), per unit of
+        each parameter.
+    error : float
+        Of a rod in space, by how much of its largest derivative one may be off; 0 in
+        the plane, where nothing is left but rounding.
     """
 
     solution: Solution
@@ -51,7 +57,9 @@ class Sensitivities:
     parameters: tuple[str, ...]
     dx_mm: Array
     dy_mm: Array
+    dz_mm: Array
     dtheta_rad: Array
+    error: float = 0.0
 
 
 def sensitivities(
@@ -62,7 +70,7 @@ def sensitivities(
     support: Support = NO_SUPPORT,
     s_mm: ArrayLike | None = None,
 ) -> Sensitivities:
-    """Return the derivatives of the equilibrium shape (plain rod, in the plane).
+    """Return the derivatives of the equilibrium shape (plain rod).
 
     Parameters
     ----------
@@ -73,7 +81,9 @@ def sensitivities(
         i, 0 at the root), ``side_mm``, ``remanence_mT`` (all sections together),
         ``flux_mT``, ``angle_deg``, ``gap_mm``, ``magnet.remanence_T``,
         ``magnet.axis_angle_deg``, ``magnet.offset_mm[0|1|2]``, ``clamp_angle_deg``,
-        ``load_factor``, ``gravity_m_s2[0|1]``, ``density_kg_m3``.
+        ``load_factor``, ``gravity_m_s2[0|1]``, ``density_kg_m3``. Of a rod that leaves
+        the plane: each of these, of `Specimen`'s numbers and of the sources', such as
+        ``remanence_y_mT[1]``, ``source[0].elevation_deg``, ``gravity_m_s2[2]``.
     s_mm : array_like, shape (n,), optional
         Increasing arc lengths from the clamp; 61 equally spaced ones by default.
 
@@ -87,20 +97,14 @@ def sensitivities(
     Raises
     ------
     InputError
-        If a parameter is unknown or has no meaning for this field, an arc length lies
-        outside the rod, or the case is not planar.
+        If a parameter is unknown or has no meaning for this case, or an arc length lies
+        outside the rod.
     SolverError
         If there is no equilibrium, or it stands at a fold.
     """
     field = as_field(field)
     check_case(specimen, field, support)
     names = _names(parameters)
-    if not (support.in_plane and field.in_plane):
-        raise InputError(
-            "gravity_m_s2[2] in m/s2, magnet elevation_deg and offset_mm[2] must be 0 "
-            "for sensitivities, which are planar; instead received one that is not"
-        )
-    check_plain(specimen)
     solution = solve(specimen, field, support=support)
     if solution.centreline is None:
         raise SolverError(
@@ -108,6 +112,8 @@ def sensitivities(
             f"derivatives; the branch ends at {solution.load_limit:.4g} of the load"
         )
     s = _stations(s_mm, specimen.length_mm)
+    if not (support.in_plane and field.in_plane and specimen.is_plain):
+        return _in_space(solution, (specimen, field, support), names, s)
     rod = rod_array(specimen, support)
     array = field_array(field, specimen.length_mm)
     clamp = rad_from_deg(support.clamp_angle_deg)
@@ -130,8 +136,22 @@ def sensitivities(
         parameters=names,
         dx_mm=out[:, 1] * specimen.length_mm,
         dy_mm=out[:, 2] * specimen.length_mm,
+        dz_mm=np.zeros((len(s), len(names))),
         dtheta_rad=out[:, 0].copy(),
     )
+
+
+def _in_space(
+    solution: Solution, case: Case, names: tuple[str, ...], s: Array
+) -> Sensitivities:
+    positions, tangents, t, error = shape_changes(case, names, s)
+    flat = t[:, 0] ** 2 + t[:, 1] ** 2
+    turn = t[:, :1] * tangents[:, 1] - t[:, 1:2] * tangents[:, 0]
+    return Sensitivities(
+        solution=solution, s_mm=s, parameters=names, dx_mm=positions[:, 0],
+        dy_mm=positions[:, 1], dz_mm=positions[:, 2],
+        dtheta_rad=turn / flat[:, None], error=error,
+    )  # fmt: skip
 
 
 def _derivatives(

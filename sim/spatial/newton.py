@@ -280,3 +280,20 @@ def solve_rod(rod, field, n, Rc, R, r, s, out):  # type: ignore[no-untyped-def]
         run(rod, field, 1.0, 2.0 * n, R, r, False, 0.0, held)
         shape(rod, 2.0 * n, held[1], s, out)
     return index, load, error
+
+
+@njit(cache=True)
+def march_from(rod, field, n, Rc, R, r, x, s, out):  # type: ignore[no-untyped-def]
+    """March from the tip's pose (R, r), turned and shifted by `x` (6,).
+
+    Returns by how much the root misses the clamp, and fills `out` as `solve_rod`.
+    """
+    held = room(rod, field, n)
+    turned, moved = R.copy(), r.copy()
+    miss = np.zeros((6, 1))
+    miss[:, 0] = x
+    _move(turned, moved, miss)
+    run(rod, field, 1.0, n, turned, moved, False, math.inf, held)
+    _miss(held[0][0], Rc, miss)
+    shape(rod, n, held[1], s, out)
+    return miss[:, 0].copy()
