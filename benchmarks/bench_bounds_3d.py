@@ -25,6 +25,7 @@ from magbend.sim.spatial.index import morse_index
 from magbend.sim.spatial.march import loads_on
 from magbend.sim.spatial.newton import room, solve_pose
 from magbend.sim.spatial.rod import clamp_of
+from magbend.sim.spatial.rows import POINTS, _meets
 
 CUBE = Magnet.cube(55.0, 1.305, elevation_deg=20.0, offset_mm=(5.0, 0.0, 8.0))
 HELD = Support(gravity_m_s2=(1.0, -2.0, -9.5), clamp_angle_deg=15.0)
@@ -56,10 +57,11 @@ def check(designs: dict, magnet: Magnet | None) -> np.ndarray:
     """Return counts: stable, unstable, gone; bounds broken, indices, outcomes off."""
     found = solve_spatial_many(designs, magnet=magnet, support=HELD)
     sizes = {k: v[:, None] if k == "side_mm" else v for k, v in designs.items()}
-    rods, total_mm, _ = _rods(sizes, HELD, 0.49)
+    rods, total_mm, margins = _rods(sizes, HELD, 0.49)
     fields = _fields(designs, None if magnet is None else before(magnet), total_mm)
     clamp, counts = clamp_of(HELD), np.zeros(6, dtype=int)
     R, r = np.empty((3, 3)), np.empty(3)
+    room_s = np.linspace(0.0, 1.0, POINTS), np.empty((POINTS, 21))
     for i, one in enumerate(found):
         counts[min(one["outcome"], 2)] += 1
         if one["outcome"] > 2:
@@ -67,7 +69,11 @@ def check(designs: dict, magnet: Magnet | None) -> np.ndarray:
         reach, turn = loads_on(rods[i], fields[i], clamp[:, 2])
         n = 8.0 * (1.7 + 3.0 * reach + 1.4 * turn)
         held = room(rods[i], fields[i], 2.0 * n)
-        index, _, _ = solve_pose(rods[i], fields[i], n, clamp, R, r, held)
+        index, _, _ = solve_pose(rods[i], fields[i], n, clamp, R, r, 1e-9, held)
+        if index >= 0 and _meets(
+            rods[i], fields[i], margins[i], 2 * n, held[1], *room_s
+        ):
+            index = -1
         if (index < 0) != (one["outcome"] == 2):
             counts[5] += 1
         elif index >= 0:

@@ -44,7 +44,7 @@ RESULT = np.dtype(
 MORE = {
     "remanence_y_mT", "remanence_z_mT", "natural_curvature_per_mm", "density_kg_m3"
 }  # fmt: skip
-CHUNK = 256
+CHUNK = 1024
 FEW = 10
 """Designs that plain Python gets through in about a second."""
 

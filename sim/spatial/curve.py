@@ -126,56 +126,56 @@ def between(curve, pair, t, h, w, out):  # type: ignore[no-untyped-def]
 
 
 @njit(**FAST)
-def _node(field, y, jet, b, c):  # type: ignore[no-untyped-def]
-    """Write jet, place and tangent at a state into `jet`, shape (21,)."""
-    jet_at(field, y[12], y[13], y[14], jet, b, c)
-    for i in range(3):
-        jet[PLACE + i] = y[12 + i]
-        jet[NEAR + i] = y[3 * i + 2]
+def _node(field, curve, pair, t, h, w, jet, b, c):  # type: ignore[no-untyped-def]
+    """Write jet, place and tangent at `t` steps into a pair into `jet`, shape (21,)."""
+    _weights(t, w)
+    for i in range(6):
+        k = 12 + i if i < 3 else 3 * i - 7
+        value = rise = 0.0
+        for j in range(3):
+            value += w[j] * curve[pair, j, k]
+            rise += w[3 + j] * curve[pair, j, STATE + k]
+        jet[PLACE + i] = value + h * rise
+    jet_at(field, jet[PLACE], jet[PLACE + 1], jet[PLACE + 2], jet, b, c)
 
 
 @njit(**FAST)
-def _rows(nodes, slopes, h, table, pair):  # type: ignore[no-untyped-def]
-    """Fill the table of a pair of steps from the jets at its three nodes."""
+def _rises(nodes, h, slopes):  # type: ignore[no-untyped-def]
+    """Write the slopes of flux, gradient and place at three nodes, times a step."""
     for j in range(3):
-        x, y, z = nodes[j, NEAR], nodes[j, NEAR + 1], nodes[j, NEAR + 2]
-        xx, xy, xz, yy, yz = (
-            nodes[j, 3], nodes[j, 4], nodes[j, 5], nodes[j, 6], nodes[j, 7],
-        )  # fmt: skip
-        slopes[j, 0] = -h * (xx * x + xy * y + xz * z)
-        slopes[j, 1] = -h * (xy * x + yy * y + yz * z)
-        slopes[j, 2] = -h * (xz * x + yz * y - (xx + yy) * z)
+        x, y, z = -h * nodes[j, NEAR], -h * nodes[j, NEAR + 1], -h * nodes[j, NEAR + 2]
+        xx, xy, xz = nodes[j, 3], nodes[j, 4], nodes[j, 5]
+        yy, yz = nodes[j, 6], nodes[j, 7]
+        slopes[j, 0] = xx * x + xy * y + xz * z
+        slopes[j, 1] = xy * x + yy * y + yz * z
+        slopes[j, 2] = xz * x + yz * y - (xx + yy) * z
         turned = bend(nodes[j], 8, x, y, z)
         for k in range(5):
-            slopes[j, 3 + k] = -h * turned[k]
-        for k in range(3):
-            slopes[j, 8 + k] = -h * nodes[j, NEAR + k]
+            slopes[j, 3 + k] = turned[k]
+        slopes[j, PLACE], slopes[j, PLACE + 1], slopes[j, PLACE + 2] = x, y, z
+
+
+@njit(**FAST)
+def _rows(nodes, slopes, table, pair):  # type: ignore[no-untyped-def]
+    """Fill the table of a pair of steps from jets and slopes at its three nodes."""
     for m in range(PLACES):
-        for k in range(8):
-            value = 0.0
-            for j in range(3):
-                value += (
-                    _WEIGHTS[m, j] * nodes[j, k] + _WEIGHTS[m, 3 + j] * slopes[j, k]
-                )
-            table[pair, m, k] = value
+        a, b, c = _WEIGHTS[m, 0], _WEIGHTS[m, 1], _WEIGHTS[m, 2]
+        p, q, r = _WEIGHTS[m, 3], _WEIGHTS[m, 4], _WEIGHTS[m, 5]
+        for k in range(NEAR):
+            table[pair, m, k] = (
+                a * nodes[0, k] + b * nodes[1, k] + c * nodes[2, k]
+                + p * slopes[0, k] + q * slopes[1, k] + r * slopes[2, k]
+            )  # fmt: skip
+        a, b, c = _PARABOLA[m, 0], _PARABOLA[m, 1], _PARABOLA[m, 2]
         for k in range(8, JET):
-            value = 0.0
-            for j in range(3):
-                value += _PARABOLA[m, j] * nodes[j, k]
-            table[pair, m, k] = value
-        for k in range(3):
-            value = 0.0
-            for j in range(3):
-                value += _WEIGHTS[m, j] * nodes[j, PLACE + k]
-                value += _WEIGHTS[m, 3 + j] * slopes[j, 8 + k]
-            table[pair, m, PLACE + k] = value
+            table[pair, m, k] = a * nodes[0, k] + b * nodes[1, k] + c * nodes[2, k]
 
 
 @njit(**MARCH)
 def tabulate(rod, field, known, curve, n, table):  # type: ignore[no-untyped-def]
     """Fill the table of a march of n steps with the field along a curve of `known`."""
-    nodes, slopes = np.empty((3, NEAR + 3)), np.empty((3, 11))
-    y, w, b, c = np.empty(STATE), np.empty(6), np.empty(12), np.empty(12)
+    nodes, slopes = np.empty((3, NEAR + 3)), np.zeros((3, NEAR))
+    w, b, c = np.empty(6), np.empty(12), np.empty(12)
     pair = first = 0
     for i in range(rod.shape[0]):
         count, held = pairs_of(rod, i, n), pairs_of(rod, i, known)
@@ -187,9 +187,10 @@ def tabulate(rod, field, known, curve, n, table):  # type: ignore[no-untyped-def
                     continue
                 at = (2 * k + j) * held / count
                 q = min(int(0.5 * at), held - 1)
-                between(curve, first + q, at - 2 * q, length, w, y)
-                _node(field, y, nodes[j], b, c)
-            _rows(nodes, slopes, h, table, pair)
+                t = at - 2 * q
+                _node(field, curve, first + q, t, length, w, nodes[j], b, c)
+            _rises(nodes, h, slopes)
+            _rows(nodes, slopes, table, pair)
             pair += 1
         first += held
 

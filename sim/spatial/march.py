@@ -51,7 +51,7 @@ SLOPE = LOOK_Z + BLOCKS * BLOCK
 SLOPE_Z = SLOPE + 7 * ROW
 AROUND = SLOPE_Z + 7 * BLOCKS * BLOCK
 WORK = AROUND + ROW
-"""Offsets, in one array of work space that begins with the section that is marched, of
+"""Offsets, in one array of work space that begins with the widest row of a section, of
 state and columns, of where a stage looks, of all slopes, and of the field there. With
 constant distances in one array the compiler knows that nothing overlaps, and runs loops
 on vectors (`batch.lanes`)."""

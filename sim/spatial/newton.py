@@ -24,8 +24,9 @@ CLOSE = 1e-3
 COARSE = 0.5
 """Share of the steps that brings Newton near, and is enough for its matrix."""
 STILL = 3e-5
-"""Move of the tip over which the field near a curve, to second order, is exact."""
-CHORD = 1e-2
+"""Move of the tip up to which the table of the field along a curve serves Newton; the
+last march, by 2 n steps, has a new one."""
+CHORD = 4e-2
 """Correction after which the matrix is kept."""
 MIN_LOAD_STEP = 1e-6
 SURE = 1e-3
@@ -83,8 +84,8 @@ def room(rod, field, n):  # type: ignore[no-untyped-def]
     """Return what marches of up to n steps work in and leave.
 
     Work space of `march` (four arrays); the curve of the last march, the table of the
-    field along a curve; how many steps each of these two has (0: there is none), and
-    how far the tip has moved since.
+    field along a curve; how many steps the one has (0: there is none), how many pairs
+    of steps the other, and how far the tip has moved since.
     """
     pairs = all_pairs(rod, n)
     along = pairs if runs_along(rod, field) else 0
@@ -102,10 +103,11 @@ def run(rod, field, load, n, R, r, columns, moved, held):  # type: ignore[no-unt
     work, curve, table, known = held
     blocks = 1 if columns else 0
     if table.shape[0] > 0 and known[0] > 0.0:
+        pairs = all_pairs(rod, n)
         known[2] += moved
-        if known[2] > STILL or known[1] != n:
+        if known[2] > STILL or known[1] != pairs:
             tabulate(rod, field, known[0], curve, n, table)
-            known[1] = n
+            known[1] = pairs
             known[2] = moved
     else:
         table = table[:0]
@@ -150,8 +152,8 @@ def _carry(w, Rc, R, r):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def newton(rod, field, load, n, Rc, R, r, first, J, held):  # type: ignore[no-untyped-def]
-    """Iterate the tip's pose (R, r) until the corrections are rounding.
+def newton(rod, field, load, n, Rc, R, r, first, goal, J, held):  # type: ignore[no-untyped-def]
+    """Iterate the tip's pose (R, r) until the corrections are below `goal`.
 
     Coarse steps bring it near and give the matrix, which stays in `J`; then n steps.
 
@@ -164,7 +166,7 @@ def newton(rod, field, load, n, Rc, R, r, first, J, held):  # type: ignore[no-un
     A, x = np.zeros((6, 6)), np.zeros((6, 1))
     w = held[0][0]
     before = size = math.inf
-    fine = False
+    fine = all_pairs(rod, COARSE * n) == all_pairs(rod, n)
     start = end = False
     for k in range(24):
         if blocked(field, r[0], r[1], r[2], 0.0):
@@ -181,9 +183,9 @@ def newton(rod, field, load, n, Rc, R, r, first, J, held):  # type: ignore[no-un
         if trace < 1.0 or not solve6(A, x):
             return False, start, end
         size = _move(R, r, x)
-        if not size < first or (k > 0 and size > max(0.25 * before, CONVERGED)):
+        if not size < first or (k > 0 and size > max(0.25 * before, goal)):
             return False, start, end
-        if fine and size < CONVERGED:
+        if fine and size < goal:
             return True, start, end
         before = size
         if not fine and size < CLOSE:
@@ -193,7 +195,7 @@ def newton(rod, field, load, n, Rc, R, r, first, J, held):  # type: ignore[no-un
 
 
 @njit(cache=True)
-def follow(rod, field, n, Rc, R, r, J, held):  # type: ignore[no-untyped-def]
+def follow(rod, field, n, Rc, R, r, goal, J, held):  # type: ignore[no-untyped-def]
     """Follow the equilibrium from no load, at (R, r), to full load.
 
     Returns the Morse index and the load reached.
@@ -215,7 +217,7 @@ def follow(rod, field, n, Rc, R, r, J, held):  # type: ignore[no-untyped-def]
         there = -1
         if _move(R, r, x) < LONGEST:
             held[3][0] = 0.0
-            found, _, sure = newton(rod, field, ahead, n, Rc, R, r, 0.1, J, held)
+            found, _, sure = newton(rod, field, ahead, n, Rc, R, r, 0.1, goal, J, held)
             if found and sure:
                 there = 0
             elif found:
@@ -235,7 +237,7 @@ def follow(rod, field, n, Rc, R, r, J, held):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def solve_pose(rod, field, n, Rc, R, r, held):  # type: ignore[no-untyped-def]
+def solve_pose(rod, field, n, Rc, R, r, goal, held):  # type: ignore[no-untyped-def]
     """Find the tip's pose (R, r) at full load, by n steps and once by 2 n.
 
     Newton from the unloaded rod is believed where it must lead to the branch from zero
@@ -243,6 +245,8 @@ def solve_pose(rod, field, n, Rc, R, r, held):  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
+    goal : float
+        Correction by n steps after which that by 2 n steps leaves next to nothing.
     held : tuple
         Of `room`, for 2 n steps.
 
@@ -256,12 +260,12 @@ def solve_pose(rod, field, n, Rc, R, r, held):  # type: ignore[no-untyped-def]
     unloaded(rod, field, coarse, Rc, R, r, held)
     R0, r0 = R.copy(), r.copy()
     index = -1
-    found, start, end = newton(rod, field, 1.0, n, Rc, R, r, 1.0, J, held)
+    found, start, end = newton(rod, field, 1.0, n, Rc, R, r, 1.0, goal, J, held)
     if found and (start or morse_index(rod, field, 1.0, coarse, R0, r0) == 0):
         index = 0 if end else morse_index(rod, field, 1.0, coarse, R, r)
     if index != 0:
         R[:], r[:] = R0, r0
-        index, load = follow(rod, field, n, Rc, R, r, J, held)
+        index, load = follow(rod, field, n, Rc, R, r, goal, J, held)
         if load < 1.0:
             return -1, load, 0.0
     run(rod, field, 1.0, 2.0 * n, R, r, False, math.inf, held)
@@ -275,7 +279,7 @@ def solve_pose(rod, field, n, Rc, R, r, held):  # type: ignore[no-untyped-def]
 def solve_rod(rod, field, n, Rc, R, r, s, out):  # type: ignore[no-untyped-def]
     """Find the pose as `solve_pose`, and fill `out` (m, 18) with states at `s`."""
     held = room(rod, field, 2.0 * n)
-    index, load, error = solve_pose(rod, field, n, Rc, R, r, held)
+    index, load, error = solve_pose(rod, field, n, Rc, R, r, CONVERGED, held)
     if index >= 0:
         run(rod, field, 1.0, 2.0 * n, R, r, False, 0.0, held)
         shape(rod, 2.0 * n, held[1], s, out)

@@ -19,6 +19,8 @@ TURN_LIMIT = 300.0
 """Largest turn of the unloaded rod, in rad."""
 STABLE, UNSTABLE, GONE, BEYOND, TOUCHES, LEAVES = range(6)
 """Outcomes (`batch.tips.OUTCOMES`)."""
+GOAL = 1e-7
+"""Correction of the tip's pose after which Newton ends."""
 POINTS = 41
 """Stations at which contact is looked for."""
 
@@ -68,7 +70,7 @@ def _solve(rod, field, Rc, margin, box, R, r, s, states):  # type: ignore[no-unt
         return BEYOND, -1, math.nan
     n = 1.7 + 3.0 * reach + 1.4 * turn
     held = room(rod, field, 2.0 * n)
-    index, _, error = solve_pose(rod, field, n, Rc, R, r, held)
+    index, _, error = solve_pose(rod, field, n, Rc, R, r, GOAL, held)
     if index < 0 or _meets(rod, field, margin, 2.0 * n, held[1], s, states):
         return GONE, -1, math.nan
     if _leaves(rod, 2.0 * n, held[1], box, s, states):

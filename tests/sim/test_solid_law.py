@@ -81,12 +81,12 @@ def test_without_its_terms_the_law_is_the_plain_rods() -> None:
     for rod in (table(strength=0.0), table(strength=0.0)[:, :13].copy()):
         R, r = np.empty((3, 3)), np.empty(3)
         held = room(rod, FIELD, 50.0)
-        assert solve_pose(rod, FIELD, 25.0, clamp, R, r, held)[0] == 0
+        assert solve_pose(rod, FIELD, 25.0, clamp, R, r, 1e-9, held)[0] == 0
         poses.append(np.append(R, r))
     assert np.abs(poses[0] - poses[1]).max() < 1e-9
     R, r = np.empty((3, 3)), np.empty(3)
     held = room(table(), FIELD, 50.0)
-    assert solve_pose(table(), FIELD, 25.0, clamp, R, r, held)[0] == 0
+    assert solve_pose(table(), FIELD, 25.0, clamp, R, r, 1e-9, held)[0] == 0
     assert np.abs(np.append(R, r) - poses[1]).max() > 1e-4
 
 
