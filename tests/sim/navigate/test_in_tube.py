@@ -304,7 +304,7 @@ def test_a_rod_that_lies_in_a_tube_buckles_as_a_beam_on_springs():
             return UniformField(flux_mT=-1e3 * part * critical / LOAD_N_T, angle_deg=0)
 
         last = navigate(
-            rod, tube, load, step_mm=4.0, support=DOWNWARD,
+            rod, tube, load, step_mm=13.0, support=DOWNWARD,
             refine=False,
         ).steps[-1]  # fmt: skip
         held_up = weight * length_mm - last.wall_N
@@ -360,7 +360,7 @@ def test_a_rod_snaps_on_and_snaps_back_later():
         radius_mm=(1.88, 1.78, 2.79, 1.09, 2.21, 1.63, 0.95),
     )  # fmt: skip
     passage = navigate(
-        gmc(2), tube, NOTHING, way_mm=(22.0, 19.5), step_mm=0.5, refine=False
+        gmc(2), tube, NOTHING, way_mm=(21.5, 19.5), step_mm=0.5, refine=False
     )
     on, back = passage.snaps
     assert back.insertion_mm < on.insertion_mm - 0.05
