@@ -14,7 +14,7 @@ from ...core.specimen import Specimen
 from ...core.units import deg_from_rad
 from ..fields import Field, Support, refuse_outside
 from ..scaling import field_array
-from ..spatial.march import MU1, MU2
+from ..spatial.march import C1, C3, K1, K3, MU1, MU2, H
 from ..spatial.rod import SpatialRod, rod_table
 from ..tube.look import Scene
 from ..tube.mesh import clamp, interpolated, mesh, root_strain, straight, trace
@@ -142,6 +142,15 @@ class TubeCase:
         """Return the field at an insertion, as the kernels take it."""
         return field_array(self.given(insertion_mm), self.length_mm)
 
+    def guided(self, insertion_mm: float) -> float:
+        """Return the energy of a curved rod that its guide holds straight."""
+        rows = self.table[::-1]
+        left = 1.0 - insertion_mm / self.length_mm
+        ends = np.cumsum(rows[:, H])
+        inside = np.clip(left - (ends - rows[:, H]), 0.0, rows[:, H])
+        bent = rows[:, K1 : K3 + 1] ** 2 / rows[:, C1 : C3 + 1]
+        return float(0.5 * inside @ bent.sum(axis=1))
+
     def rod(self, insertion_mm: float) -> Rod:
         """Return the meshed rod at an insertion."""
         root = np.array(self.lumen.entry_mm) / self.length_mm
@@ -150,7 +159,7 @@ class TubeCase:
 
 @dataclass(slots=True)
 class TubeState:
-    """The rod at rest in the tube."""
+    """The rod at rest in the tube; its energy is that of the whole rod."""
 
     insertion_mm: float
     rod: Rod
@@ -232,7 +241,7 @@ def at_rest(
         rod=rod,
         rest=rest,
         moved=float(np.linalg.norm(moved, axis=1).max()),
-        energy=rest.energy,
+        energy=rest.energy + case.guided(insertion_mm),
         rubbed=rest.rubbed,
     )
 
@@ -292,7 +301,7 @@ def read_step(case: TubeCase, state: TubeState, rubbed: float) -> SpatialStep:
         most_curvature_per_mm=float(curvature.max()),
         wall_N=sum(forces),
         most_wall_N=max(forces, default=0.0),
-        energy_Nmm=state.energy * unit_N * L,
+        energy_Nmm=rest.energy * unit_N * L,
         rubbed_Nmm=rubbed * unit_N * L,
         tip_mm=tip,
         tip_angle_deg=deg_from_rad(math.acos(max(-1.0, min(1.0, cosine)))),

@@ -214,6 +214,22 @@ def test_the_work_of_the_hand_is_stored_or_rubbed_away(mu):
     assert (rubbed > 0.5 * stored) == (mu > 0.0)
 
 
+def test_a_curved_rod_drives_itself_out_of_its_guide():
+    """What held it straight comes free: EI k^2 / 2 a length, and with contacts too."""
+    passage = navigate(CURVED, WIDE, NOTHING, step_mm=5.0, refine=False)
+    for step, E_MPa in ((passage.steps[1], 1.0), (passage.steps[-1], 2.0)):
+        free_N = 0.5 * E_MPa * 0.6 * 0.8**3 / 12.0 * 0.03**2
+        assert step.push_N == pytest.approx(-free_N, rel=1e-6)
+        assert step.energy_Nmm == pytest.approx(0.0, abs=1e-12)
+    bend = Tube(name="bend", points_mm=helix(10.0, 20.0, 0.6), radius_mm=1.6)
+    walk = navigate(CURVED, bend, NOTHING, step_mm=0.25, refine=False, way_mm=14.0)
+    push = np.array([step.push_N for step in walk.steps]) + 0.5 * free_N
+    at = np.array([step.insertion_mm for step in walk.steps])
+    work = np.sum(np.diff(at) * (push[1:] + push[:-1]) / 2.0)
+    stored = walk.steps[-1].energy_Nmm - walk.steps[0].energy_Nmm
+    assert work == pytest.approx(stored, rel=0.02)
+
+
 @pytest.mark.slow
 def test_friction_in_a_winding_tube_is_the_capstans():
     """A soft rod, drawn at its tip, holds or pulls by exp(mu phi) at its guide.
