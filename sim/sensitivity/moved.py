@@ -86,7 +86,7 @@ def _number(
 ) -> Move:
     """Return the move of a number, or of element `index` of a vector, of a record."""
     known = {one.name for one in fields(owner)}
-    value = getattr(owner, key) if key in known else None
+    value: Any = getattr(owner, key) if key in known else None
     if isinstance(value, tuple) and index is not None and index < len(value):
         start = value[index]
     elif isinstance(value, (int, float)) and index is None:

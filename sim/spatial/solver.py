@@ -317,7 +317,7 @@ def _steps(table: Array, flux: Array, tip: Array) -> float:
             "rest_curvature_per_mm must turn the whole rod by less than "
             f"{TURN_LIMIT:g} rad; instead received {turns:.3g} rad"
         )
-    return 5.0 + 9.0 * reach + 4.0 * turns
+    return 5.0 + 9.0 * float(reach) + 4.0 * float(turns)
 
 
 def _gone(flux: Array, length_mm: float, load: float, tip: Array) -> SpatialSolution:
