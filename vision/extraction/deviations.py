@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 TIP_BLUR, WIDTH_PX, WIDTH_SHADE = 0.04, 0.055, 0.3
 """Systematic parts: of an end face whose edge is not straight, in blurs; of a width
 whose blur is no Gaussian's; and the share of a shade's pull that is left in a width."""
-FACE_SEEN, FACE_HIDDEN = 0.17, 0.14
+FACE_SEEN, FACE_HIDDEN = 0.17, 0.1
 """Doubt of where an end is, in widths of its face where the camera sees it (it has
 another grey value than the top); else, where a lower edge is hidden, of that width
 times the tangent of the angle at which it would be seen."""
@@ -116,6 +116,8 @@ def _tip_sd_mm(
     """Return the tip's deviations along x and y of the specimen frame.
 
     What side faces shift alike at the root and at the tip moves the frame with the tip.
+    A clamp that is taken too far out by d, on a rod of curvature k there, turns the
+    frame by k d: the tip moves by d (k y - 1) along x, and by -k d x along y.
     """
     share = SIDE_FACE if dark else PALE_FACE
     faces = share * result.width_mm * view.rise_across / view.along
@@ -125,11 +127,14 @@ def _tip_sd_mm(
     end = math.radians(result.tip_angle_deg)
     turn = math.radians(result.clamp_angle_sd_deg)
     x, y = result.tip_mm
+    bend = float(result.points["kappa_per_mm"][0])
+    turn = math.sqrt(max(turn**2 - (bend * clamp) ** 2, 0.0))
     parts = np.array(
         [
             [tip * math.cos(end), tip * math.sin(end)],
             [beside * math.sin(end), beside * math.cos(end)],
-            [clamp, across[0]],
+            [clamp * (bend * y - 1.0), clamp * bend * x],
+            [0.0, across[0]],
             [turn * y, turn * x],
             [scale * x, scale * y],
         ]
