@@ -1,7 +1,7 @@
 """Errors on strangers' benches: scenes drawn at random, none of them tuned on.
 
     python benchmarks/bench_reserve.py [--count 200] [--seed 9001] [--page DIR]
-    python benchmarks/bench_reserve.py --kind blur --count 100 --seed 9101 [--peers]
+    python benchmarks/bench_reserve.py --kind blur --count 40 --seed 9111 [--peers]
 
 Seeds below 1000 are for work on the code; quoted figures come from seeds of 9000 and
 above that nobody looked at before. Prints, by difficulty: how many were measured,
