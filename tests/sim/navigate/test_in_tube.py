@@ -20,7 +20,7 @@ from magbend.sim import (
     gmc,
     solve_spatial,
 )
-from magbend.sim.navigate import channel, navigate
+from magbend.sim.navigate import channel, navigate, navigate_many
 from magbend.sim.tube import Tube, helix
 
 NOTHING = UniformField(flux_mT=0.0)
@@ -386,3 +386,12 @@ def test_a_rod_snaps_on_and_snaps_back_later():
     first, *_, last = (s for s in passage.steps if s.insertion_mm == 19.5)
     assert math.dist(first.tip_mm, last.tip_mm) < 1e-6
     assert passage.most("overlap_mm") < 1e-3
+
+
+def test_many_rods_go_through_a_tube_as_each_by_itself():
+    bend = Tube(name="bend", points_mm=helix(10.0, 20.0, 0.6), radius_mm=2.0)
+    rods = [gmc(2), gmc(5)]
+    together = navigate_many(rods, bend, OBLIQUE, way_mm=10.0, step_mm=2.0)
+    for rod, way in zip(rods, together, strict=True):
+        alone = navigate(rod, bend, OBLIQUE, way_mm=10.0, step_mm=2.0, refine=False)
+        assert way.steps[-1].tip_mm == alone.steps[-1].tip_mm
