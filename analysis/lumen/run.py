@@ -121,6 +121,11 @@ def measure_in_lumen(
     lumen = lumen_of(given["text"])
     specimen = SpecimenModel.model_validate(record["specimen"]).specimen()
     files = calibration or folder / "calibration.json", bare or folder / "bare.png"
+    if not files[1].is_file():
+        raise ConfigError(
+            f"{files[1]}: there is no picture of the empty channel; take one before "
+            "the rod is fed in (magbend rig snapshot) and name it with --bare"
+        )
     camera = read_calibration(files[0])
     placed, setting = place(
         lumen, read_bare(files[1]), camera,

@@ -81,12 +81,28 @@ def load_runs(
     runs, left_out = [], []
     for path in find_runs(paths):
         try:
-            runs.append(load_run(path, unverified=unverified))
+            runs.append(_free(load_run(path, unverified=unverified)))
         except StoreError as error:
             left_out.append(str(error))
     if not runs:
         raise StoreError(left_out[0])
     return runs, left_out
+
+
+def _free(run: RunData) -> RunData:
+    """Return a run whose rod nothing but its clamp holds.
+
+    Raises
+    ------
+    StoreError
+        If it lies in a lumen: what is made of free rods would be wrong of it.
+    """
+    if (run.record.get("plan") or {}).get("lumen"):
+        raise StoreError(
+            f"{run.path}: its rod lies in a lumen, whose walls hold it too; magbend "
+            f"analysis lumen {run.path} compares it with such a rod"
+        )
+    return run
 
 
 def load_run(path: Path | str, *, unverified: bool = False) -> RunData:

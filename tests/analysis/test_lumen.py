@@ -12,9 +12,16 @@ import pytest
 from magbend.analysis.lumen.contacts import fed
 from magbend.analysis.lumen.place import place
 from magbend.analysis.lumen.run import measure_in_lumen
+from magbend.analysis.runs.load import load_runs
 from magbend.analysis.twin.lumen_bench import LumenBench
 from magbend.analysis.twin.run import calibrate_twin, run_on_twin
-from magbend.core.errors import ConfigError, MagbendError, RigError, VisionError
+from magbend.core.errors import (
+    ConfigError,
+    MagbendError,
+    RigError,
+    StoreError,
+    VisionError,
+)
 from magbend.core.magnet import Magnet
 from magbend.rig import check_run, read_plan, write_templates
 from magbend.sim import gmc
@@ -94,6 +101,18 @@ def test_contacts_are_flagged_where_the_rod_is_pressed_and_nowhere_else(ran):
     assert table["missed"].tolist() == table["extra"].tolist() == [0, 0]
     assert (table["rms_mm"] < 0.1).all()
     assert not check_run(folder).problems
+
+
+def test_a_run_without_its_empty_channel_says_how_to_take_one(ran):
+    _, folder, _ = ran
+    with pytest.raises(ConfigError, match="take one before the rod is fed in"):
+        measure_in_lumen(folder, bare=folder / "gone.png")
+
+
+def test_it_is_not_compared_with_a_free_rod(ran):
+    _, folder, _ = ran
+    with pytest.raises(StoreError, match="its rod lies in a lumen"):
+        load_runs([folder])
 
 
 def test_a_rod_across_a_wide_channel_touches_nothing():
