@@ -76,7 +76,9 @@ class Solution(Tabular):
         Where there is no equilibrium, how the branch from zero load ends.
     buckled_tips_mm : tuple of (float, float)
         Where the rod is straight and unstable (a field exactly against it, above
-        Euler's load), the tips of the stable shapes to which it buckles.
+        Euler's load), the tips of the stable shapes to which it buckles within the
+        plane. Left free, a rod as stiff in all directions may turn about its axis: they
+        are two of a circle.
     """
 
     centreline: Centreline | None

@@ -28,8 +28,8 @@ STILL = 3e-5
 last march, by 2 n steps, has a new one."""
 CHORD = 4e-2
 """Correction after which the matrix is kept."""
-MIN_LOAD_STEP = 1e-6
-SURE = 1e-3
+MIN_LOAD_STEP = 1e-7
+SURE = 1e-6
 """Step of the load too short for a jump to another branch."""
 LONGEST = 0.5
 """Largest predicted move of the tip."""

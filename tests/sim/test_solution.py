@@ -76,6 +76,24 @@ def test_the_straight_rod_against_the_field_names_its_buckled_shapes() -> None:
     assert below.buckled_tips_mm == ()
 
 
+@pytest.mark.parametrize("lean", [1e-2, 1e-5, 1e-8])
+def test_nearly_against_the_field_the_rod_buckles_the_way_it_leans(lean: float) -> None:
+    """In space anywhere on a circle: a rod as stiff in all directions may turn."""
+    (x, y), _ = solve(
+        gmc(2), UniformField(flux_mT=420.0, angle_deg=180.0)
+    ).buckled_tips_mm
+    found = solve(
+        gmc(2), UniformField(flux_mT=420.0, angle_deg=180.0 - math.degrees(lean))
+    )
+    assert found.status == "stable"
+    assert found.centreline.tip_mm == pytest.approx((x, y), abs=30.0 * lean + 1e-6)
+    across = 420.0 * lean * np.array([math.cos(1.0), math.sin(1.0)])
+    space = solve_spatial(gmc(2), (-420.0, *across))
+    assert space.status == "stable"
+    expected = x, y * math.cos(1.0), y * math.sin(1.0)
+    assert tuple(space.r_mm[-1]) == pytest.approx(expected, abs=30.0 * lean + 1e-5)
+
+
 def test_the_sag_is_that_of_the_shape_in_space() -> None:
     rod = replace(gmc(2), density_kg_m3=2640.0)
     held = Support(gravity_m_s2=(0.0, 0.0, -9.80665))
