@@ -157,8 +157,9 @@ def main(n: int = 50_000, seed: int = 2026) -> None:
     rng = np.random.default_rng(seed)
     each = n // 3
     for times in (1.0, 5.0, 20.0):
-        designs = rods(rng, each, times)
-        gap = {"gap_mm": designs.pop("gap_mm")}
+        designs = rods(rng, each, times, signs=1)
+        designs["remanence_mT"] = designs["remanence_mT"][:, 0]
+        gap = {"gap_mm": rng.uniform(30.0, 120.0, each)}
         flux = {
             "flux_mT": rng.uniform(0.0, 120.0, each),
             "angle_deg": rng.uniform(0.0, 360.0, each),
