@@ -225,7 +225,8 @@ class Beam:
         AB, R = np.zeros((self.band, self.u.size)), np.zeros(self.u.size)
         load = np.zeros_like(self.u)
         mu, K = self.E / 2 / (1 + nu), self.E / 3 / (1 - 2 * nu)
-        for _ in range(14):
+        sizes = []
+        while len(sizes) < 12 or sizes[-1] < 0.5 * sizes[-4]:
             load[:] = self.volume[:, None] * body
             load[-n:] += self.face[:, None] * traction((self.X0 + self.u)[-n:])
             assemble(
@@ -237,7 +238,8 @@ class Beam:
             r = (load.ravel() - R)[3 * n :]
             change = self._correction(AB[:, 3 * n :], r).reshape(-1, 3)
             self.u[n:] += change
-            if np.abs(change).max() < near:
+            sizes.append(np.abs(change).max())
+            if sizes[-1] < near:
                 return True
         return False
 
