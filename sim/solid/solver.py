@@ -32,7 +32,7 @@ from .space import largest_strain, solve_in_space
 
 STRAIN_LIMIT = 0.2
 """Largest strain up to which the model was compared with finite elements."""
-TWISTED_LIMIT = 0.06
+TWISTED_LIMIT = 0.04
 """The same of rectangles that leave their planes: what a fixed face does to one that is
 bent both ways and twisted is not in the model, and grows with the square of strain."""
 SMALL_STRAIN = 0.1

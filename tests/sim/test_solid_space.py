@@ -182,7 +182,7 @@ def test_strain_is_that_of_the_surface() -> None:
 @pytest.mark.parametrize("shape", SHAPES)
 def test_strains_beyond_the_model_are_refused_with_the_largest(shape: str) -> None:
     soft = rod(shape, E_MPa=0.25)
-    limit = r"of rectangles .* 0\.06" if shape == "rectangle" else r"must be below 0\.2"
+    limit = r"of rectangles .* 0\.04" if shape == "rectangle" else r"must be below 0\.2"
     words = rf"largest strain {limit} for .* 0\.[2-9]"
     with pytest.raises(InputError, match=words):
         solve(soft, UniformField(flux_mT=90.0), support=ABOVE, model="solid")
