@@ -172,13 +172,20 @@ class PlanarWalk(Walk[Case, State]):
         ]
 
     def error_mm(self) -> float:
-        """Return how far the last shape is from the one on elements half as long."""
+        """Return how far the last shape is from the one on elements half as long.
+
+        With friction the whole way is gone again on them: it remembers.
+        """
         state = self._here()
-        fine = replace(self.case, elements=2 * self.case.elements, friction=0.0)
+        fine = replace(self.case, elements=2 * self.case.elements)
         if self.case.friction:
-            return math.nan
-        outcome, new = at_rest(fine, state, state.insertion_mm, SOFT)
-        if outcome != SETTLED:
+            again = PlanarWalk(fine, self.step_mm, self.limit_N)
+            there = all(again.go_to(mm) for mm in (*self.turns, state.insertion_mm))
+            new = again.state
+        else:
+            outcome, new = at_rest(fine, state, state.insertion_mm, SOFT)
+            there = outcome == SETTLED
+        if not there or new is None:
             return math.nan
         s = state.rod.s
         off = trace(new.rod, new.u, s)[:2] - trace(state.rod, state.u, s)[:2]

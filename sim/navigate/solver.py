@@ -68,7 +68,7 @@ def navigate(
         ends, fed in from one.
     refine : bool
         Whether to solve the last step again on elements of half the size, for the
-        error.
+        error; with friction the whole way.
 
     Returns
     -------

@@ -99,6 +99,8 @@ class Walk(ABC, Generic[C, S]):
         self.events: list[Event] = []
         self.outcome = INSERTED
         self.rubbed = 0.0
+        self.turns: list[float] = []
+        """Insertions that were gone to, and left again."""
 
     @abstractmethod
     def _rest(self, old: S | None, insertion_mm: float, soft: float) -> tuple[int, S]:
@@ -125,6 +127,7 @@ class Walk(ABC, Generic[C, S]):
         if self.state is None and not self._begin(target_mm):
             return False
         now = self._here()
+        self.turns.append(now.insertion_mm)
         way = math.copysign(1.0, target_mm - now.insertion_mm)
         step = self.step_mm
         while now.insertion_mm != target_mm:

@@ -93,6 +93,20 @@ def test_friction_leaves_a_loop_of_the_work_it_took():
     assert passage.steps[-1].rubbed_Nmm > out.rubbed_Nmm
 
 
+def test_the_error_is_known_with_friction_too_on_a_way_forth_and_back():
+    bend = channel("bend", width_mm=2.5, legs=[(5.0, 0.0), (15.0, 60.0), (15.0, 0.0)])
+    coarse, fine = (
+        navigate(
+            gmc(2), bend, NOTHING, way_mm=(28.0, 18.0), friction=0.2, elements=n,
+            step_mm=1.0, refine=n == 6,
+        )
+        for n in (6, 48)
+    )  # fmt: skip
+    off_mm = math.dist(coarse.steps[-1].tip_mm, fine.steps[-1].tip_mm)
+    assert 0.5 * off_mm < coarse.error_mm < 20.0 * off_mm
+    assert coarse.error_mm < 0.05
+
+
 def blind() -> Lumen:
     return Lumen(
         name="blind",
