@@ -106,7 +106,12 @@ def main() -> int:
         points = np.column_stack([found.points["x_mm"], found.points["y_mm"]])
         distance = signed_distance(points, truth["line"])
         best = signed_distance(aligned(points, truth["line"]), truth["line"])
-        turn = start_deg(found.points_px) - start_deg(truth["px"][::4])
+        steps = min(len(found.points_px), len(truth["px"])) - 1
+        turn, true = (
+            start_deg(line[:: (len(line) - 1) // steps])
+            for line in (found.points_px, truth["px"])
+        )
+        turn -= true
         turn = (turn + 180.0) % 360.0 - 180.0
         turn_sd = found.clamp_angle_sd_deg
         pixels = signed_distance(found.points_px, truth["px"])
