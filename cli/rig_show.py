@@ -29,7 +29,10 @@ def print_dry_run(plan: Plan, as_json: bool) -> None:
     rows = []
     for step in steps:
         preview = previews.get(step.index)
-        tip = preview.tip_mm if preview else None
+        free = plan.model.lumen is None  # in a lumen, walls hold the rod too
+        tip = preview.tip_mm if preview and free else None
+        status = preview.status if preview else None
+        status = status if free else "in a lumen"
         rows.append(
             {
                 "index": step.index,
@@ -42,7 +45,7 @@ def print_dry_run(plan: Plan, as_json: bool) -> None:
                 "predicted_flux_mT": preview.flux_mT if preview else None,
                 "predicted_tip_x_mm": tip[0] if tip else None,
                 "predicted_tip_y_mm": tip[1] if tip else None,
-                "predicted_status": preview.status if preview else None,
+                "predicted_status": status,
             }
         )
     if as_json:
@@ -59,7 +62,9 @@ def print_dry_run(plan: Plan, as_json: bool) -> None:
     say("step kind         gap mm  stage mm  move mm   time s  flux mT  tip x, y mm")
     for row in rows:
         say(_dry_line(row))
-    if plan.rig.magnet is not None:
+    if plan.model.lumen is not None:
+        say("where the rod lies in its lumen, magbend sim navigate predicts")
+    elif plan.rig.magnet is not None:
         say(_weight(plan))
     if plan.rig.stage.gap_at_zero_mm is None:
         from ..rig import NEVER_MEASURED

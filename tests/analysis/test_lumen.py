@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
+from typer.testing import CliRunner
 
 from magbend.analysis.lumen.contacts import fed
 from magbend.analysis.lumen.place import place
@@ -15,6 +17,7 @@ from magbend.analysis.lumen.run import measure_in_lumen
 from magbend.analysis.runs.load import load_runs
 from magbend.analysis.twin.lumen_bench import LumenBench
 from magbend.analysis.twin.run import calibrate_twin, run_on_twin
+from magbend.cli import rig
 from magbend.core.errors import (
     ConfigError,
     MagbendError,
@@ -53,8 +56,8 @@ wall_height_mm = 1.4
 def planned(folder: Path, plan: str = PLAN) -> Path:
     write_templates(folder, twin=True)
     (folder / "bend90.toml").write_text((LUMENS / "bend90.toml").read_text())
-    rig, path = folder / "rig.toml", folder / "plan.toml"
-    rig.write_text(rig.read_text() + FEED)
+    bench, path = folder / "rig.toml", folder / "plan.toml"
+    bench.write_text(bench.read_text() + FEED)
     text = path.read_text().replace("[70.0, 60.0, 50.0]", "[90.0, 80.0]")
     path.write_text(text.replace("\n[settle]", f"{plan}\n[settle]", 1))
     return path
@@ -176,6 +179,15 @@ def test_a_plan_that_cannot_be_is_refused_in_a_sentence(tmp_path, change, said):
         return
     with pytest.raises(ConfigError, match=said):
         read_plan(path)
+
+
+def test_a_dry_run_does_not_foretell_a_free_rods_tip(tmp_path):
+    said = CliRunner().invoke(
+        rig.app, ["run", str(planned(tmp_path)), "--twin", "--dry-run", "--json"]
+    )
+    steps = json.loads(said.stdout)["steps"]
+    assert [step["predicted_tip_x_mm"] for step in steps] == [None, None]
+    assert {step["predicted_status"] for step in steps} == {"in a lumen"}
 
 
 def test_a_run_without_a_lumen_is_named():
