@@ -107,7 +107,7 @@ def solve_spatial_many(
     ...     "side_mm": 1.0, "remanence_mT": 20.07, "density_kg_m3": 2640.0,
     ...     "flux_mT": [38.0, 50.0]}, support=Support(gravity_m_s2=(0, 0, -9.80665)))
     >>> np.round(tips["tip_z_mm"], 3).tolist()
-    [-1.697, -1.644]
+    [-1.661, -1.644]
     """
     support = support or Support()
     if not isinstance(support, Support):
