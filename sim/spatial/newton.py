@@ -31,6 +31,9 @@ CHORD = 4e-2
 MIN_LOAD_STEP = 1e-7
 SURE = 1e-6
 """Step of the load too short for a jump to another branch."""
+AGREED = 0.03
+"""Difference of two loads at which a branch ends, by n and 2 n steps, that is none."""
+MOST_STEPS = 3000.0
 LONGEST = 0.5
 """Largest predicted move of the tip."""
 
@@ -276,10 +279,30 @@ def solve_pose(rod, field, n, Rc, R, r, goal, held):  # type: ignore[no-untyped-
 
 
 @njit(cache=True)
+def solve_sure(rod, field, n, Rc, R, r, goal):  # type: ignore[no-untyped-def]
+    """Find the pose as `solve_pose`; believe that there is none when finer steps agree.
+
+    A rod that is drawn to a magnet feels far more there than what its steps are for.
+
+    Returns
+    -------
+    tuple
+        Index, load and error, the steps n that found them, and their `room`.
+    """
+    before = -1.0
+    while True:
+        held = room(rod, field, 2.0 * n)
+        index, load, error = solve_pose(rod, field, n, Rc, R, r, goal, held)
+        if index >= 0 or abs(load - before) < AGREED or n > MOST_STEPS:
+            return index, load, error, n, held
+        before = load
+        n *= 2.0
+
+
+@njit(cache=True)
 def solve_rod(rod, field, n, Rc, R, r, s, out):  # type: ignore[no-untyped-def]
-    """Find the pose as `solve_pose`, and fill `out` (m, 18) with states at `s`."""
-    held = room(rod, field, 2.0 * n)
-    index, load, error = solve_pose(rod, field, n, Rc, R, r, CONVERGED, held)
+    """Find the pose as `solve_sure`, and fill `out` (m, 21) with states at `s`."""
+    index, load, error, n, held = solve_sure(rod, field, n, Rc, R, r, CONVERGED)
     if index >= 0:
         run(rod, field, 1.0, 2.0 * n, R, r, False, 0.0, held)
         shape(rod, 2.0 * n, held[1], s, out)
