@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -157,6 +158,7 @@ def _data(name: str, found: Followed) -> dict[str, Any]:
                 "status": one.status,
                 "morse_index": one.morse_index,
                 "energy_uJ": one.energy_uJ,
+                "work_uJ": one.work_uJ,
                 "snapped": one.snapped,
             }
             for one in found.points
@@ -191,6 +193,9 @@ def _print(name: str, found: Followed, files: list[Path | None]) -> None:
         say(f"  pulled in at {lost} points")
     if found.dissipated_uJ > 0.0:
         say(f"  snaps dissipate {found.dissipated_uJ:.4g} microjoules")
+    work_uJ = found.points[-1].work_uJ
+    if math.isfinite(work_uJ):
+        say(f"  work done on the rod {work_uJ:.4g} microjoules")
     for file in files:
         if file is not None:
             say(f"wrote {file}")

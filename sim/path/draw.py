@@ -16,7 +16,7 @@ from .pull_in import PullIn
 
 COLUMNS = (
     "status", "morse_index", "tip_x_mm", "tip_y_mm", "tip_angle_deg", "energy_uJ",
-    "snapped",
+    "work_uJ", "snapped",
 )  # fmt: skip
 
 
@@ -28,10 +28,11 @@ def path_csv(path: Path) -> str:
     for one in path.points:
         row: list[object] = [f"{one.value:.15g}", one.status, one.morse_index]
         if one.centreline is None:
-            row += ["", "", "", ""]
+            row += [""] * 5
         else:
             x, y = one.centreline.tip_mm
-            numbers = (x, y, one.centreline.tip_angle_deg, one.energy_uJ)
+            angle_deg = one.centreline.tip_angle_deg
+            numbers = (x, y, angle_deg, one.energy_uJ, one.work_uJ)
             row += [f"{number:.15g}" for number in numbers]
         writer.writerow([*row, int(one.snapped)])
     return buffer.getvalue()

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -65,6 +65,10 @@ class PathPoint:
         Unstable directions in the plane; -1 where there is no equilibrium.
     energy_uJ : float
         Elastic, magnetic and of the weight, in microjoules; NaN without a shape.
+    work_uJ : float
+        What it took to come here from the first point, done on the rod by what changes
+        (the hand that moves the magnet, the field that turns); NaN from where the rod
+        had no shape.
     snapped : bool
         Whether the rod has jumped here from the point before.
     """
@@ -74,6 +78,7 @@ class PathPoint:
     centreline: Centreline | None
     morse_index: int
     energy_uJ: float
+    work_uJ: float = 0.0
     snapped: bool = False
 
 
@@ -184,7 +189,10 @@ def follow_path(
         values.extend(np.linspace(a, b, steps + 1)[1:].tolist())
     found = [walk.start(values[0])]
     for k, (a, b) in enumerate(pairwise(values), start=1):
-        found.append(walk.go(a, b))
+        point = walk.go(a, b)
+        # Between snaps all work is stored; at a snap nothing moves but the rod.
+        step_uJ = point.energy_uJ - found[-1].energy_uJ + walk.lost_uJ
+        found.append(replace(point, work_uJ=found[-1].work_uJ + step_uJ))
         progress(k, len(values) - 1)
     return Path(
         quantity=quantity, points=tuple(found), folds=tuple(walk.folds),
@@ -217,6 +225,7 @@ class _Walk:
         self.s = stations(points)
         self.folds: list[PathFold] = []
         self.dissipated_uJ = 0.0
+        self.lost_uJ = 0.0  # in the last step; NaN if there was no shape to lose to
         self.u: Array | None = None
         self.index = 0
         self.is_begun = False
@@ -239,6 +248,7 @@ class _Walk:
     def go(self, a: float, b: float) -> PathPoint:
         """Return the point at `b`, after that at `a`."""
         self.is_begun = True
+        self.lost_uJ = 0.0
         if self.u is None:
             return self.start(b)
         at, jump, before = a, b - a, self.u
@@ -282,10 +292,8 @@ class _Walk:
             raise SolverError(
                 f"the path was lost at {value:.6g}; try more steps, and please report"
             )
-        L = specimen.length_mm
-        x, y, theta, kappa = out
-        refuse_outside(field, x, y, L)
-        line = Centreline._trusted(self.s * L, x * L, y * L, theta, kappa / L)
+        refuse_outside(field, out[0], out[1], specimen.length_mm)
+        line = self._line(out, specimen)
         return PathPoint(
             value=value, status=STABLE if self.index == 0 else UNSTABLE,
             centreline=line, morse_index=self.index, snapped=snapped,
@@ -301,8 +309,22 @@ class _Walk:
             self.u, self.index = other, 0
             point = self._point(b, snapped=True)
         if point.centreline is not None:
-            self.dissipated_uJ += max(0.0, last.energy_uJ - point.energy_uJ)
+            self.lost_uJ = last.energy_uJ - self._energy_uJ(at, point)
+            self.dissipated_uJ += max(0.0, self.lost_uJ)
         return point
+
+    def _energy_uJ(self, at: float, point: PathPoint) -> float:
+        """Return the energy of the new shape where the old one ended, just before."""
+        index, _, out = self._settle(at, self.s)
+        if index != self.index:
+            return point.energy_uJ
+        specimen, field, support = self.case(at)
+        return energy_uJ(specimen, field, support, self._line(out, specimen))
+
+    def _line(self, out: Array, specimen: Specimen) -> Centreline:
+        x, y, theta, kappa = out
+        L = specimen.length_mm
+        return Centreline._trusted(self.s * L, x * L, y * L, theta, kappa / L)
 
     def _nearest_uniform(self, value: float, last: PathPoint) -> Array | None:
         """Return the unknowns of the nearest stable equilibrium of a uniform field."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from magbend.core.errors import InputError
 from magbend.core.units import MU0
 from magbend.sim import (
     Cuboid,
+    PathPoint,
     Rod,
     Section,
     Support,
@@ -25,6 +27,7 @@ from magbend.sim import (
     solve,
 )
 from magbend.sim.path.draw import animate_path, draw_path, path_csv
+from magbend.sim.path.energy import energy_uJ
 
 BAR = Rod(
     name="bar", side_mm=1.0, remanence_mT=20.0,
@@ -70,6 +73,38 @@ def test_without_fold_each_point_is_that_of_solve_there_and_back() -> None:
         np.testing.assert_allclose(
             point.centreline.tip_mm, solve(gmc(2), field).centreline.tip_mm, atol=1e-9
         )
+
+
+def test_the_work_of_a_loop_is_the_torque_on_what_turns_it_and_is_dissipated() -> None:
+    """The torque of the field, shape by shape, integrated over its angle."""
+    flux = flux_mT_of(FOLDS[120.0])
+    start = UniformField(flux_mT=flux, angle_deg=100.0)
+    way = (100.0, 290.0, 70.0, 100.0)
+    path = follow_path(BAR, start, angle_deg=way, steps=240, points=121)
+
+    def torque(point: PathPoint) -> float:
+        near = [
+            UniformField(flux_mT=flux, angle_deg=point.value + d) for d in (-0.01, 0.01)
+        ]
+        low, high = (energy_uJ(BAR, f, Support(), point.centreline) for f in near)
+        return (high - low) / 0.02
+
+    work_uJ = sum(
+        0.5 * (torque(a) + torque(b)) * (b.value - a.value)
+        for a, b in pairwise(path.points)
+        if not b.snapped
+    )
+    missed = sum(  # what the two steps with a snap turn the field by, on either shape
+        torque(a) * (fold.value - a.value) + torque(b) * (b.value - fold.value)
+        for (a, b), fold in zip(
+            [pair for pair in pairwise(path.points) if pair[1].snapped],
+            path.folds,
+            strict=True,
+        )
+    )
+    assert path.dissipated_uJ > 0.0
+    assert path.points[-1].work_uJ == pytest.approx(path.dissipated_uJ, rel=1e-6)
+    assert work_uJ + missed == pytest.approx(path.points[-1].work_uJ, rel=0.01)
 
 
 def test_the_slope_of_the_energy_is_the_work_of_the_magnet() -> None:
