@@ -65,8 +65,9 @@ def shape(
     ] = None,
     model: Annotated[str, typer.Option(help="rod, or solid (shear, clamp).")] = "rod",
     poisson: Annotated[
-        float, typer.Option(help="Poisson's ratio, for --model solid.")
-    ] = 0.49,
+        float | None,
+        typer.Option(help="Poisson's ratio, for --model solid, if not the specimen's."),
+    ] = None,
     gravity_m_s2: Annotated[
         tuple[float, float, float],
         typer.Option(help="Free fall (x y z) in m/s2; seen from above: 0 0 -9.80665."),
@@ -97,6 +98,11 @@ def shape(
         gravity_m_s2=gravity_m_s2,
         load_factor=load_factor,
     )
+    if poisson is not None and model == "rod":
+        raise typer.BadParameter(
+            "--poisson belongs to --model solid; a plain rod twists with the "
+            "poisson_ratio of its specimen file"
+        )
     if out is not None:
         output_file(out)
     solution = once(
@@ -115,7 +121,7 @@ def shape(
     if out is not None:
         _write(solution, rod, out)
     if as_json:
-        print_json(data | _columns(solution))
+        print_json(data | solution.columns)
     else:
         _print(data)
 
@@ -152,6 +158,8 @@ def _summary(rod: Specimen, model: str, solution: Solution) -> dict[str, Any]:
     line = solution.centreline
     if line is not None:
         data["tip_mm"] = line.tip_mm
+        if solution.z_mm is not None:
+            data["tip_z_mm"] = float(solution.z_mm[-1])
         data["tip_angle_deg"] = line.tip_angle_deg
         data["length_mm"] = line.length_mm
         data["root_moment_Nm"] = solution.root_moment_Nm
@@ -175,17 +183,6 @@ def _check(
     return verify(rod, field, solution, support=support)
 
 
-def _columns(solution: Solution) -> dict[str, Any]:
-    line = solution.centreline
-    if line is None:
-        return {}
-    names = ("s_mm", "x_mm", "y_mm", "theta_rad", "kappa_per_mm")
-    found = {name: getattr(line, name) for name in names}
-    if solution.z_mm is not None:
-        found["z_mm"] = solution.z_mm
-    return found
-
-
 def _write(solution: Solution, rod: Specimen, out: Path) -> None:
     from ..core.errors import SolverError
 
@@ -194,7 +191,7 @@ def _write(solution: Solution, rod: Specimen, out: Path) -> None:
             f"{rod.name} is {solution.status}: its branch ends at "
             f"{solution.load_limit:.4g} of the load, so there is no shape to write"
         )
-    solution.centreline.to_csv(out)
+    solution.centreline.to_csv(out, z_mm=solution.z_mm)
 
 
 def _print_ending(end: dict[str, Any]) -> None:
@@ -210,12 +207,13 @@ def _print_ending(end: dict[str, Any]) -> None:
 def _print(data: dict[str, Any]) -> None:
     say(f"{data['specimen']}, model {data['model']}: {data['status']}")
     if "tip_mm" in data:
-        x, y = (round(value, 5) + 0.0 for value in data["tip_mm"])
-        say(f"  tip          ({x:.5f}, {y:.5f}) mm")
+        tip = *data["tip_mm"], *([data["tip_z_mm"]] if "tip_z_mm" in data else [])
+        shown = ", ".join(f"{round(value, 5) + 0.0:.5f}" for value in tip)
+        say(f"  tip          ({shown}) mm")
         say(f"  tip angle    {data['tip_angle_deg']:.5f} deg")
         say(f"  root moment  {data['root_moment_Nm']:.6g} N m")
         say(f"  Morse index  {data['morse_index']}")
-        if data["sag_mm"] != 0.0:
+        if data["sag_mm"] >= 5e-6:
             say(f"  sag          {data['sag_mm']:.5f} mm below the clamp")
         for x, y in data.get("buckled_tips_mm", ()):
             say(f"  buckles to   a stable shape with its tip at ({x:.5f}, {y:.5f}) mm")

@@ -100,13 +100,20 @@ class Centreline:
         """Positions, shape (n, 2), in mm."""
         return np.column_stack([self.x_mm, self.y_mm])
 
-    def to_csv(self, path: Path | None = None) -> str:
-        """Return the table as CSV with 15 digits; write it to `path` too, if given."""
-        table = np.column_stack([getattr(self, name) for name in COLUMNS])
+    def to_csv(
+        self, path: Path | None = None, *, z_mm: NDArray[np.float64] | None = None
+    ) -> str:
+        """Return the table as CSV with 15 digits; write it to `path` too, if given.
+
+        The heights `z_mm` of a shape seen from above, shape (n,), are a last column.
+        """
+        columns = {name: getattr(self, name) for name in COLUMNS}
+        if z_mm is not None:
+            columns["z_mm"] = z_mm
         buffer = io.StringIO()
         np.savetxt(
-            buffer, table, fmt="%.15g", delimiter=",", header=",".join(COLUMNS),
-            comments="",
+            buffer, np.column_stack(list(columns.values())), fmt="%.15g", delimiter=",",
+            header=",".join(columns), comments="",
         )  # fmt: skip
         text = buffer.getvalue()
         if path is not None:

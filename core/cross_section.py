@@ -16,6 +16,8 @@ SIZES = {
 }
 """Shapes, and the sizes each is given by."""
 ALL_SIZES = ("side_mm", "width_mm", "height_mm", "diameter_mm", "bore_mm")
+ODD_FIFTHS = 1.004523762795139616133
+"""Sum of 1 / k^5 over odd k: 31/32 zeta(5)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,10 +125,15 @@ def torsion_constant_mm4(width_mm: float, height_mm: float) -> float:
     Notes
     -----
     Saint-Venant's series, J = b t^3 [1/3 - (64 / pi^5) (t / b) sum tanh(k pi b / 2 t) /
-    k^5 over odd k], t the shorter side; 20 terms leave 1e-9. A square: 0.1405771 a^4.
+    k^5 over odd k], t the shorter side. The sum of 1 / k^5 is known, 31/32 zeta(5), and
+    what the tanh lack of 1 falls as exp(-k pi b / t): six terms leave rounding. A
+    square: 0.1405770150 a^4.
     """
     t, b = sorted((width_mm, height_mm))
-    series = sum(math.tanh(k * math.pi * b / (2.0 * t)) / k**5 for k in range(1, 40, 2))
+    lacking = sum(
+        (1.0 - math.tanh(k * math.pi * b / (2.0 * t))) / k**5 for k in range(1, 13, 2)
+    )
+    series = ODD_FIFTHS - lacking
     return b * t**3 * (1.0 / 3.0 - 64.0 / math.pi**5 * t / b * series)
 
 

@@ -345,7 +345,7 @@ def check_plain(specimen: Specimen) -> None:
         raise InputError(
             f"specimen {specimen.name!r} must have natural_curvature_per_mm in 1/mm "
             "and remanence_y_mT and remanence_z_mT in mT of 0 here; instead received "
-            "another: solve and solve_spatial take it"
+            "another: the plain rod of solve and solve_spatial takes it"
         )
 
 

@@ -46,7 +46,7 @@ def solve(
     *,
     support: Support = NO_SUPPORT,
     model: str = "rod",
-    poisson_ratio: float = 0.49,
+    poisson_ratio: float | None = None,
     points: int = 61,
 ) -> Solution:
     """Return the equilibrium that the rod reaches when its load grows from zero.
@@ -62,8 +62,9 @@ def solve(
     model : {"rod", "solid"}
         Plain inextensible rod, or a rod with shear, stretch and the clamped face of a
         solid (`solid`).
-    poisson_ratio : float
-        Of the material; only the solid model knows it.
+    poisson_ratio : float, optional
+        Of the material, for the solid model; that of the specimen by default. The plain
+        rod twists with the specimen's.
     points : int
         Number of points of the shape, equally spaced from clamp to tip.
 

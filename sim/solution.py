@@ -107,14 +107,22 @@ class Solution(Tabular):
         """How far the lowest point is below the clamp, in mm; 0 in the plane."""
         return 0.0 if self.z_mm is None else -float(min(self.z_mm.min(), 0.0))
 
+    @property
+    def columns(self) -> dict[str, NDArray[np.float64]]:
+        """The table of the centreline, and `z_mm` where it leaves the plane, by name.
+
+        Empty where there is no shape.
+        """
+        if self.centreline is None:
+            return {}
+        found = {name: getattr(self.centreline, name) for name in COLUMNS}
+        return found if self.z_mm is None else found | {"z_mm": self.z_mm}
+
     def to_dataframe(self) -> pd.DataFrame:
-        """Return the centreline as a table, a row a point; empty without a shape."""
+        """Return `columns` as a table, a row a point; empty without a shape."""
         import pandas as pd
 
-        line = self.centreline
-        return pd.DataFrame(
-            {name: getattr(line, name) for name in COLUMNS} if line else {}
-        )
+        return pd.DataFrame(self.columns)
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the shape into `ax`, or into new axes of pyplot; return them."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, PositiveFloat, ValidationError
+from pydantic import BeforeValidator, ConfigDict, PositiveFloat, ValidationError
 from pydantic import Field as Key
 
 from ..core.errors import ConfigError, InputError
@@ -40,10 +40,20 @@ class _Posed(FileModel):
     offset_mm: Vector = (0.0, 0.0, 0.0)
 
 
+def _three(given: object) -> object:
+    """Return the sides of a cube for its one."""
+    return (given,) * 3 if isinstance(given, int | float) else given
+
+
+Sides = Annotated[
+    tuple[PositiveFloat, PositiveFloat, PositiveFloat], BeforeValidator(_three)
+]
+
+
 class _Cuboid(_Posed):
     kind: Literal["cuboid"]
     side_mm: PositiveFloat | None = None
-    sides_mm: tuple[PositiveFloat, PositiveFloat, PositiveFloat] | None = None
+    sides_mm: Sides | None = None
     remanence_T: float
 
 

@@ -44,7 +44,7 @@ def solve_solid(
     field: Field,
     *,
     support: Support | None = None,
-    poisson_ratio: float = 0.49,
+    poisson_ratio: float | None = None,
     points: int = 61,
 ) -> Solution:
     """Return the equilibrium of the solid, as `solve` does of the plain rod.
@@ -53,8 +53,8 @@ def solve_solid(
     ----------
     specimen, field, support, points
         As of `solve`; the rod straight and magnetised along its axis.
-    poisson_ratio : float
-        Of all sections, from 0 to 0.5.
+    poisson_ratio : float, optional
+        Of all sections, from 0 to 0.5; that of the specimen by default.
 
     Returns
     -------
@@ -75,7 +75,8 @@ def solve_solid(
     field = as_field(field)
     check_case(specimen, field, support)
     check_plain(specimen)
-    ratio = within(poisson_ratio, 0.0, 0.5, "poisson_ratio", "")
+    given = specimen.poisson_ratio if poisson_ratio is None else poisson_ratio
+    ratio = within(given, 0.0, 0.5, "poisson_ratio", "")
     limit = STRAIN_LIMIT
     if support.in_plane and field.in_plane:
         solution, strain = solve_in_plane(specimen, field, support, ratio, points)

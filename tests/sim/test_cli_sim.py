@@ -9,13 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer import BadParameter
 from typer.testing import CliRunner
 
 from magbend.cli import main, sim
 from magbend.core.centreline import Centreline
 from magbend.core.errors import ConfigError, InputError, SolverError
 from magbend.core.specimen_file import read_specimen
-from magbend.sim import UniformField, gmc
+from magbend.sim import Uniform, UniformField, gmc, solve_spatial
 from magbend.sim.study.sweep import STUDIES, sweep
 
 SPECIMENS = Path(__file__).resolve().parents[2] / "fixtures" / "specimens"
@@ -46,6 +47,43 @@ def test_shape_writes_twelve_digits_and_json(tmp_path: Path) -> None:
     assert data["tip_mm"] == pytest.approx(line.tip_mm, abs=1e-13)
     assert data["status"] == "stable"
     assert len(data["s_mm"]) == 61
+
+
+def test_a_rod_lifted_out_of_the_plane_keeps_its_height(tmp_path: Path) -> None:
+    """A field that points up lifts the tip, seen nowhere in x and y alone."""
+    source, out = tmp_path / "up.toml", tmp_path / "shape.csv"
+    source.write_text(
+        '[[source]]\nkind = "uniform"\nflux_mT = 50.0\nelevation_deg = 40.0\n'
+    )
+    case = ("shape", "--gmc", "2", "--magnet", str(source))
+    text = run(*case, "--out", str(out))
+    data = json.loads(run(*case, "--json"))
+    field = Uniform(flux_mT=50.0, elevation_deg=40.0)
+    x, y, z = solve_spatial(gmc(2), field).r_mm[-1]
+    assert z > 2.0
+    assert f"({x:.5f}, {y:.5f}, {z:.5f}) mm" in text
+    assert "sag" not in text
+    assert (*data["tip_mm"], data["tip_z_mm"]) == pytest.approx((x, y, z), abs=1e-8)
+    table = np.genfromtxt(out, delimiter=",", names=True)
+    assert table["z_mm"][-1] == pytest.approx(z, abs=1e-8)
+    assert Centreline.from_csv(out).tip_mm == pytest.approx((x, y), abs=1e-8)
+
+
+def test_poissons_ratio_is_that_of_the_file(tmp_path: Path) -> None:
+    """The solid takes the file's unless told another; the plain rod takes no other."""
+    rod = tmp_path / "rod.toml"
+    text = (SPECIMENS / "gmc2.toml").read_text()
+    rod.write_text(text.replace("remanence_mT", "poisson_ratio = 0.3\nremanence_mT", 1))
+    case = ("shape", "--specimen", str(rod), "--field-mT", "50", "--json")
+
+    def tip(*more: str) -> list[float]:
+        found: list[float] = json.loads(run(*case, *more))["tip_mm"]
+        return found
+
+    assert tip("--model", "solid") == tip("--model", "solid", "--poisson", "0.3")
+    assert tip("--model", "solid") != tip("--model", "solid", "--poisson", "0.49")
+    with pytest.raises(BadParameter, match="--model solid"):
+        tip("--poisson", "0.3")
 
 
 def test_specimen_file_is_the_table(tmp_path: Path) -> None:

@@ -427,6 +427,12 @@ def test_files_hold_sources(tmp_path: Path) -> None:
     field = read_field(path)
     assert field.follows_gap
     assert [source.kind for source in field.sources] == ["cuboid", "uniform"]
+    for same in ("sides_mm = 55.0", "sides_mm = [55, 55, 55]"):
+        path.write_text(FILE.replace("side_mm = 55.0", same), encoding="utf-8")
+        assert read_field(path).sources == field.sources
+    path.write_text(FILE.replace("side_mm = 55.0", "sides_mm = -5"), encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"sides_mm.*greater than 0"):
+        read_field(path)
     path.write_text("side_mm = 55.0\nremanence_T = 1.305\n", encoding="utf-8")
     old = MagnetField(magnet=Magnet.cube(55.0, 1.305), gap_mm=60.0)
     assert read_field(path).at_gap(60.0).sources == old.sources

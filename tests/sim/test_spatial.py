@@ -190,7 +190,10 @@ def test_small_sag_of_a_rectangular_beam() -> None:
 
 def test_torsion_constants() -> None:
     """Timoshenko and Goodier, Theory of Elasticity, table of rectangles."""
-    assert torsion_constant_mm4(1.0, 1.0) == pytest.approx(0.1405770, abs=1e-6)
+    assert torsion_constant_mm4(1.0, 1.0) == pytest.approx(0.140577014955155, rel=1e-13)
+    assert torsion_constant_mm4(1.6, 0.8) == pytest.approx(
+        0.4573633542391 * 0.8**4, rel=1e-12
+    )
     assert torsion_constant_mm4(2.0, 1.0) == pytest.approx(2 * 0.2287, abs=1e-4)
     assert torsion_constant_mm4(1.0, 10.0) == pytest.approx(10 * 0.3123, abs=1e-3)
     circle = section(width_mm=2.0, height_mm=2.0, round_section=True)
