@@ -326,3 +326,5 @@ def test_known_length_gives_the_scale():
     assert "no correction" in found.camera_height_source
     with pytest.raises(InputError, match="at least 10 px"):
         calibrate_known_length((99, 99), from_px=(1, 1), to_px=(2, 2), length_mm=25.0)
+    with pytest.raises(InputError, match="99 x 99 px; instead received 1e"):
+        calibrate_known_length((99, 99), from_px=(1, 1), to_px=(1e9, 2), length_mm=25.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
@@ -76,3 +77,22 @@ def test_height_that_cannot_be_corrected_is_doubted(
     found = extract(photo, camera, rod_height_mm=rod_height_mm)
     assert found.ok
     assert ("height_doubtful" in found.flags) is doubtful
+
+
+@pytest.mark.parametrize("short_of_tip", [0.5, 0.2])
+def test_rod_under_a_piece_of_paper_is_not_taken_for_whole(short_of_tip):
+    """What lies over the rod ends it; the rest of it beyond is a doubt."""
+    frame = draw(
+        curve("arc", angle_deg=30.0), np.random.default_rng(2), size_px=(1200, 1000)
+    )
+    plain = extract(as_photo(frame.image), None)
+    assert plain.ok
+    assert "other_rod" not in plain.flags
+    x, y = plain.points["x_px"], plain.points["y_px"]
+    at = round((1.0 - short_of_tip) * (len(x) - 1))
+    image = frame.image.copy()
+    centre = (round(float(x[at])), round(float(y[at])))
+    cv2.circle(image, centre, 40, float(np.median(image)), cv2.FILLED)
+    covered = extract(as_photo(image), None)
+    assert covered.length_px < plain.length_px - 20.0
+    assert "other_rod" in covered.flags

@@ -241,12 +241,20 @@ def calibrate_known_length(
     Raises
     ------
     InputError
-        If the ends lie closer than 10 pixels, or a number cannot be.
+        If the ends lie closer than 10 pixels or outside the picture, or a number
+        cannot be.
     """
     positive(length_mm, "length_mm", "mm")
     if camera_height_mm is not None:
         positive(camera_height_mm, "camera_height_mm", "mm")
     ends = [finite(value, "an end", "px") for value in (*from_px, *to_px)]
+    width, height = size_px
+    for x, y in (ends[:2], ends[2:]):
+        if not (-0.5 <= x <= width - 0.5 and -0.5 <= y <= height - 0.5):
+            raise InputError(
+                "the ends of the known length must lie in the photograph of "
+                f"{width} x {height} px; instead received {x:g},{y:g}"
+            )
     distance = math.hypot(ends[2] - ends[0], ends[3] - ends[1])
     if distance < 10.0:
         raise InputError(

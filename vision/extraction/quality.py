@@ -8,15 +8,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..curve.curve import Curve
 from ..curve.robust import median, quantile
-from ..edge.edges import clear_of
 from ..edge.state import LostError
 from ..edge.step_line import lanes
 from ..find.ground import View
 from ..find.rod import Candidate
 from ..measurement import Measurement
 from ..picture.photo import Photo
+from .beyond_tip import goes_on_after_gap, tip_goes_on
 from .deviations import scale_sd
 from .refine import Refined
 from .root import HIDDEN_MM, root_hidden
@@ -33,9 +32,6 @@ SCALE = 5e-4
 """Doubt of the scale, for want of the camera's height, above which it is named."""
 
 TIP_GOES_ON, OTHER_ROD = "tip_goes_on", "other_rod"
-PALER_TIP, TINTED_TIP = 0.12, 0.15
-"""Step to either side beyond the tip, over the rod's, that a shade does not have; and
-one in the difference of two colours, over the paper's light in each."""
 
 OVER_PAPER, BARE = 1.0, 0.6
 """Widths of bare paper under an axis that are more than a speck, and its light."""
@@ -115,14 +111,15 @@ def doubts(
         flags.append("clamp_at_border")
     if candidate.root == "free":
         flags.append("no_clamp")
-    if candidate.rivalled:
+    after_gap = not refined.rough and goes_on_after_gap(view, refined)
+    if candidate.rivalled or after_gap:
         flags.append(OTHER_ROD)
     # By a tag the place may be known all the same.
     if root_hidden(refined, setting) and result.clamp_sd_mm > 0.5 * HIDDEN_MM:
         flags.append("root_hidden")
     if candidate.root == "clamp" and _goes_on(photo, refined):
         flags.append("clamp_doubtful")
-    if not refined.rough and _tip_goes_on(photo, view, refined):
+    if not refined.rough and tip_goes_on(photo, view, refined):
         flags.append(TIP_GOES_ON)
     if direction_is_doubtful(result.clamp_angle_sd_deg, result.length_mm):
         flags.append("direction_doubtful")
@@ -150,47 +147,6 @@ def _length_is_off(result: Measurement, setting: Setting) -> bool:
     if setting.length_sd_mm is not None:
         tolerance = 3.0 * math.hypot(setting.length_sd_mm, result.length_sd_mm)
     return abs(result.length_mm - setting.length_mm) > tolerance
-
-
-def _tip_goes_on(photo: Photo, view: View, refined: Refined) -> bool:
-    """Whether something as wide as the rod goes on beyond its tip.
-
-    Then it may be the rod, paler or in another colour; a shade has softer edges, and
-    darkens all colours alike.
-    """
-    curve, width = refined.fit.curve, refined.typical_width
-    far = np.linspace(max(0.4 * width, 4.0), 1.2 * width + 4.0, 9)
-    step, contrast = _beyond_tip(view.grey, curve, width, far, view.sign)
-    if step > PALER_TIP * contrast:
-        return True
-    close = clear_of(refined.blur) + np.linspace(0.0, 0.2 * width, 9)
-    half = round(2.0 * width) + 12
-    x, y = (max(round(float(part)) - half, 0) for part in curve.points[-1])
-    around = photo.colour((slice(y, y + 2 * half), slice(x, x + 2 * half)))
-    if around is None:
-        return False
-    near = replace(curve, points=curve.points - np.array([x, y]))
-    blue, green, red = np.moveaxis(
-        around / np.maximum(np.median(around, axis=(0, 1)), 1e-3), 2, 0
-    )
-    return any(
-        _beyond_tip(one - other, near, width, close, sign)[0] > TINTED_TIP
-        for one, other in ((blue, green), (green, red), (red, blue))
-        for sign in (-1.0, 1.0)
-    )
-
-
-def _beyond_tip(
-    grey: NDArray[np.float32], curve: Curve, width: float, s: Array, sign: float
-) -> tuple[float, float]:
-    """Return the lesser step to either side, `s` beyond a tip, and that of its rod."""
-    beside = 0.5 * width + 4.0
-    across = np.array([-beside, -0.25 * width, 0.0, 0.25 * width, beside])
-    beyond = lanes(grey, curve, curve.s[-1] + s, across, sign)
-    before = lanes(grey, curve, curve.s[-1] - s, across, sign)
-    contrast = median(before[::4].ravel()) - median(before[1:4].ravel())
-    step = np.minimum(beyond[0], beyond[4]) - beyond[1:4].max(axis=0)
-    return quantile(step, 0.25), contrast
 
 
 def _height_is_assumed(setting: Setting) -> bool:

@@ -20,7 +20,7 @@ Clamp = Literal["auto", "none"]
 
 _NO_CLAMP = (
     "the rod grows from no clamp and from no border of the picture; "
-    "for a rod that floats freely say so with clamp none"
+    "for a rod that floats freely say --free (from Python: clamp='none')"
 )
 _SIZE = 1.6
 """Factor by which a thing may be larger or smaller than the rod that is sought."""
