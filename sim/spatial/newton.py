@@ -19,6 +19,9 @@ from .march import K1, K3, WORK, Y, Z, all_pairs
 
 CONVERGED = 1e-9
 """Correction after which the next, by the matrix kept, is rounding."""
+PASSING = 1e-7
+"""The same at loads on the way to the full one: next to a load where a direction is
+about to become unstable, what rounding leaves is larger than `CONVERGED`."""
 CLOSE = 1e-3
 """Correction after which the coarse steps have done their part."""
 COARSE = 0.5
@@ -31,7 +34,7 @@ CHORD = 4e-2
 MIN_LOAD_STEP = 1e-7
 SURE = 1e-6
 """Step of the load too short for a jump to another branch."""
-AGREED = 0.03
+AGREED = 1e-3
 """Difference of two loads at which a branch ends, by n and 2 n steps, that is none."""
 MOST_STEPS = 3000.0
 LONGEST = 0.5
@@ -220,7 +223,8 @@ def follow(rod, field, n, Rc, R, r, goal, J, held):  # type: ignore[no-untyped-d
         there = -1
         if _move(R, r, x) < LONGEST:
             held[3][0] = 0.0
-            found, _, sure = newton(rod, field, ahead, n, Rc, R, r, 0.1, goal, J, held)
+            end = goal if ahead == 1.0 else max(goal, PASSING)
+            found, _, sure = newton(rod, field, ahead, n, Rc, R, r, 0.1, end, J, held)
             if found and sure:
                 there = 0
             elif found:
