@@ -19,7 +19,7 @@ from magbend.vision.find.ground import View
 from magbend.vision.find.rod import find_candidates
 from magbend.vision.find.track import start_curve
 from magbend.vision.measurement import Measurement
-from magbend.vision.synthetic.square_view import curve, draw
+from magbend.vision.synthetic.square_view import STANDARD, curve, draw
 
 
 def measured(seed=0):
@@ -96,3 +96,16 @@ def test_rod_under_a_piece_of_paper_is_not_taken_for_whole(short_of_tip):
     covered = extract(as_photo(image), None)
     assert covered.length_px < plain.length_px - 20.0
     assert "other_rod" in covered.flags
+
+
+@pytest.mark.parametrize("blur_px", [5.0, 6.0])
+def test_rod_far_out_of_focus_is_as_wide_as_in_focus(blur_px):
+    """Taken for sharp at first, its edges must not be measured at the core alone."""
+    frame = draw(
+        curve("arc", angle_deg=60.0), np.random.default_rng(4), size_px=(1200, 1000),
+        light=replace(STANDARD, blur_px=blur_px),
+    )  # fmt: skip
+    found = extract(as_photo(frame.image), None)
+    assert found.width_px == pytest.approx(20.0, rel=0.1)
+    assert found.blur_px == pytest.approx(blur_px, rel=0.2)
+    assert "blurred" in found.flags

@@ -23,7 +23,7 @@ from ..measurement import Measurement, failure
 from ..picture.photo import Photo
 from .bare import flattened
 from .quality import OTHER_ROD, TIP_GOES_ON, doubts, refusal
-from .refine import refine
+from .refine import Refined, refine
 from .setting import Setting
 from .specimen_frame import measurement
 
@@ -42,6 +42,10 @@ something: all levels and colours are then looked at."""
 
 SMOOTH = 0.12
 """Blur for a rough rod, in widths: its two edges do not feel each other yet."""
+
+COLLAPSED, WIDE = 0.9, 0.25
+"""Width over that at half level, below which edges may be more blurred than they seem;
+and the blur from which they are then sought, in widths."""
 
 
 def extract(photo: Photo, calibration: Calibration | None, **known: Any) -> Measurement:
@@ -192,12 +196,26 @@ def finish(
         If there is nothing to vouch for.
     """
     calibrated = setting.calibration is not None
-    refined = refine(
-        view.grey, start, root=candidate.root, sign=view.sign,
-        joints=setting.joints_px,
-        walls=setting.walls_px if calibrated and view.sign > 0.0 else None,
-        face_px=setting.face_px(start.curve), sd_px=sd_px,
-    )  # fmt: skip
+
+    def refined_from(start: Start) -> Refined:
+        return refine(
+            view.grey, start, root=candidate.root, sign=view.sign,
+            joints=setting.joints_px,
+            walls=setting.walls_px if calibrated and view.sign > 0.0 else None,
+            face_px=setting.face_px(start.curve), sd_px=sd_px,
+        )  # fmt: skip
+
+    refined = refined_from(start)
+    if not start.rough and refined.typical_width < COLLAPSED * start.width:
+        # Taken for sharp, a far blurred edge is sought between too close levels, and
+        # seems the sharper for it; from the other end its blur is found.
+        blurred = refined_from(replace(start, blur=WIDE * start.width))
+        if blurred.typical_width < COLLAPSED * start.width:
+            raise LostError(
+                "edges_lost",
+                "the rod's two edges run into each other in the blur: focus the lens",
+            )
+        refined = blurred
     if np.isfinite(sd_px) and not refined.settled:
         raise LostError("edges_lost", "the rod moved too far since the last frame")
     refusal(view, refined, candidate)
