@@ -112,6 +112,10 @@ def _field(
     from ..sim.navigate import moving, read_poses
 
     table = read_poses(poses) if poses is not None else []
+    if table and field_mT is not None and "flux_mT" in table[0]:
+        raise typer.BadParameter("give either --field-mT or flux_mT in the poses")
+    if table and gap_mm is not None and "gap_mm" in table[0]:
+        raise typer.BadParameter("give either --gap-mm or gap_mm in the poses")
     angle_deg, elevation_deg = angles_deg
     field: Field = UniformField(flux_mT=0.0, angle_deg=angle_deg)
     if field_mT is not None or file is not None or gap_mm is not None:
@@ -220,9 +224,13 @@ def _print(data: dict[str, Any], passage: Passage) -> None:
     for event in passage.snaps:
         say(
             f"  snap            at {event.insertion_mm:.3f} mm: the rod moves "
-            f"{event.moved_mm:.2f} mm and loses {event.released_Nmm:.3g} N mm"
+            f"{event.moved_mm:.2f} mm and "
+            f"{'gains' if event.released_Nmm < 0.0 else 'loses'} "
+            f"{abs(event.released_Nmm):.3g} N mm"
         )
     for event in passage.events:
+        if event.kind == "coarse":
+            say(f"  too coarse      at {event.insertion_mm:.3f} mm: {event.what}")
         if event.kind == "self-contact":
             say(
                 f"  self-contact    at {event.insertion_mm:.3f} mm: {event.what}; "

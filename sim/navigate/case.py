@@ -81,7 +81,7 @@ class Case:
         if not given.in_plane:
             raise InputError(
                 "a field in a planar lumen must be within its plane (elevation_deg 0, "
-                f"no offset in z); instead received {given}"
+                "no offset in z); instead received one that leaves it: a tube takes it"
             )
         return field_array(given, self.length_mm)
 

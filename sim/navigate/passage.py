@@ -110,10 +110,11 @@ class Event:
 
     Parameters
     ----------
-    kind : {"snap", "gate", "gate back", "touch", "self-contact"}
+    kind : {"snap", "gate", "gate back", "touch", "coarse", "self-contact"}
         ``snap``: the rod left a state that ceased to be one (buckling, snap-through)
         for another. ``gate``: the tip passed a gate, or came back through it.
-        ``touch``: the first contact with a wall. ``self-contact``: the rod meets
+        ``touch``: the first contact with a wall. ``coarse``: the push was larger
+        within the step than at any of its ends. ``self-contact``: the rod meets
         itself for the first time; from there on it passes through itself.
     insertion_mm : float
         When.

@@ -34,6 +34,8 @@ CAREFUL = 16
 """A rod that moves so fast without a snap is followed by this part of a step."""
 LOSS = 1e-4
 """A snap loses more than this part of the energy."""
+HIDDEN = 0.5
+"""A step that stores this part more than the push at its ends gives hides a peak."""
 LEAST = 1e-2
 """Energy below which none is lost or won that matters, in EI / L."""
 EASE = 1e-3
@@ -213,6 +215,17 @@ class Walk(ABC, Generic[C, S]):
         won = -self._released(old, new)
         return not callable(self.case.field) and won > LOSS * self._scale(old, new)
 
+    def _hides(self, old: S, new: S) -> bool:
+        """Return whether the push was much larger within a step than at its ends.
+
+        So it is where a tip meets an edge head on, buckles, and slips off it.
+        """
+        if new.insertion_mm - old.insertion_mm < self.step_mm / CAREFUL:
+            return False
+        taken = (new.insertion_mm - old.insertion_mm) / self.case.length_mm
+        work = abs(0.5 * (old.push + new.push) * taken)
+        return self._rises(old, new) and -self._released(old, new) > HIDDEN * work
+
     def _scale(self, old: S, new: S) -> float:
         taken = (new.insertion_mm - old.insertion_mm) / self.case.length_mm
         return LEAST + abs(new.energy) + abs(old.energy) + abs(old.push * taken)
@@ -256,6 +269,9 @@ class Walk(ABC, Generic[C, S]):
                     moved_mm=new.moved * self.case.length_mm,
                 )
             )
+        elif self._hides(old, new):
+            what = "the push was larger within the step; take finer ones"
+            self.events.append(Event(kind="coarse", insertion_mm=at_mm, what=what))
         for name in self._passed(self.steps[-1], step):
             self.events.append(
                 Event(

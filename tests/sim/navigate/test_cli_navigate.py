@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from typer import BadParameter
 from typer.testing import CliRunner
 
 from magbend.cli import sim
@@ -94,12 +95,22 @@ def test_json_holds_every_step_and_contact():
     [
         (("nowhere.toml", "--gmc", "2"), "there is no such file"),
         ((BEND, "--gmc", "9"), "GMC number must be from 1 to 7"),
+        (
+            (BEND, "--gmc", "2", "--field-mT", "9", "--elevation-deg", "30"),
+            "must be within its plane .* one that leaves it: a tube takes it",
+        ),
         ((BEND, "--gmc", "2", "--friction", "nan"), "friction must be a finite number"),
     ],
 )
 def test_what_cannot_be_is_said_in_a_sentence(given, said):
     with pytest.raises((ConfigError, InputError), match=said):
         run("navigate", *given)
+
+
+def test_a_field_given_twice_is_refused():
+    poses = str(FIXTURES / "lumens" / "steer.toml")
+    with pytest.raises(BadParameter, match="either --field-mT or flux_mT in the"):
+        run("navigate", BEND, "--gmc", "2", "--field-mT", "20", "--poses", poses)
 
 
 def test_a_magnets_path_through_a_branch_is_a_plan_and_poses_that_do_it(tmp_path):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from magbend.core.magnet import Magnet
 from magbend.core.specimen import Section, Specimen
@@ -43,6 +44,31 @@ def test_the_field_chooses_the_branch(sign, branch):
     passage = navigate(gmc(2), fork, field, way_mm=26.0, refine=False)
     assert passage.gates == (branch,)
     assert passage.outcome == "inserted"
+
+
+@pytest.mark.parametrize(("step_mm", "coarse"), [(0.5, True), (0.05, False)])
+def test_a_tip_that_meets_an_edge_head_on_carries_eulers_load_or_it_says_so(
+    step_mm, coarse
+):
+    """A column of two sections, one end clamped, the other free to move aside."""
+    fork = read_lumen(LUMENS / "fork.toml")
+    passage = navigate(
+        gmc(2), fork, NOTHING, step_mm=step_mm, way_mm=14.0, refine=False
+    )
+    assert any(event.kind == "coarse" for event in passage.events) is coarse
+    soft, stiff = 10e6 * 1e-12 / 12.0, 15e6 * 1e-12 / 12.0  # E I, N m2; 10 and 3.5 mm
+    load_N = brentq(
+        lambda load: (
+            math.tan(math.sqrt(load / soft) * 10e-3)
+            * math.tan(math.sqrt(load / stiff) * 3.5e-3)
+            - math.sqrt(stiff / soft)
+        ),
+        5e-3, 18e-3,
+    )  # fmt: skip
+    if coarse:
+        assert passage.most("push_N") < 0.1 * load_N
+    else:
+        assert passage.most("push_N") == pytest.approx(load_N, rel=1e-3)
 
 
 def test_the_mirrored_lumen_gives_the_mirrored_rod():
