@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 from ...core.jit import njit
 from ..curve.curve import Curve
+from ..curve.robust import median
 from .edges import _bilinear
+from .flank import WHITE, fit_flanks, is_held, median_profile
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -132,7 +134,27 @@ def fit_step(
     )
     if not (abs(place - line.s) < 2.0 * wide and rise > 0.0):
         return line
-    return replace(line, s=place, skew=skew, rise=rise)
+    line = replace(line, s=place, skew=skew, rise=rise)
+    return _to_whole_step(light[near], s, across[near], line, wide, inner, outer)
+
+
+def _to_whole_step(
+    light: Array, s: Array, across: Array, line: EndFace, blur: float, inner: float,
+    outer: float,
+) -> EndFace:  # fmt: skip
+    """Return a line beside what is white moved to where it is with all its light."""
+    if not is_held(light):
+        return line
+    x = np.arange(-inner, outer, STEP_PX)
+    at = line.s + line.skew * across
+    profiles = [
+        np.interp(place + x, s, lane) for place, lane in zip(at, light, strict=True)
+    ]
+    profile = median_profile(np.array(profiles))
+    if not median(profile[x > 0.6 * outer]) > WHITE:
+        return line
+    step = fit_flanks(x, profile[None], blur=blur, known=True)
+    return replace(line, s=line.s + float(step.moves()[0, 0]))
 
 
 @njit(cache=True)

@@ -34,9 +34,10 @@ SIDE_FACE, PALE_FACE, WIDTH_FACE = 0.07, 0.5, 0.03
 one that is not dark, and what of it is left in a dark rod's width."""
 PALE_PX = 0.2
 """Doubt of a width that is not dark, whatever is seen of its sides."""
-SATURATED = 0.45
-"""Doubt of an edge, in blurs, beside paper that is white: how much more light there was
-is not known. With 1.5 times what makes it white, half level lies 0.43 blurs off."""
+WHOLE, CUT_OFF = 0.05, 0.45
+"""Doubt of an edge beside paper that is white, in px and again in blurs where all its
+light was fitted; else in blurs. With 1.5 times what makes it white, half level of what
+is left lies 0.43 blurs off."""
 
 
 def is_dark(seen_in: View) -> bool:
@@ -80,8 +81,9 @@ def with_deviations(
     """
     own = camera.scale_relative_sd
     scale = math.hypot(own if math.isfinite(own) else 0.0, scale_sd(camera, height_mm))
-    clamp = root.sd / float(view.along[0])
-    white = SATURATED * refined.saturated * refined.blur
+    unsure = WHOLE * (1.0 + refined.blur) if refined.whole else CUT_OFF * refined.blur
+    white = unsure * refined.saturated
+    clamp = math.hypot(root.sd, white) / float(view.along[0])
     rise = float(view.rise_along[-1])
     seen = rise < 0.0 or not dark
     face = rise * (FACE_SEEN if seen else FACE_HIDDEN * rise / float(view.along[-1]))

@@ -22,6 +22,7 @@ from ..edge.ends import find_ends
 from ..edge.state import LostError, Root, Seen, State
 from ..edge.step_line import EndFace
 from ..edge.wall_light import Walls, to_wall_ends
+from ..edge.white import are_cut_off, saturated, to_whole_edges
 from ..find.track import FLARED, Start
 
 Array = NDArray[np.float64]
@@ -43,9 +44,6 @@ _JOINTS_STILL_PX = 0.05
 _BIN_PX = 4.0
 _BINS = 200
 """Stations are averaged over bins before the fit: so far, or so many on a long rod."""
-
-WHITE = 0.97
-"""Light of what is as light as a picture can tell, but for noise."""
 
 ROOT_CLEAR = 0.3
 """Widths next to the clamp that are left out of the fit."""
@@ -77,6 +75,8 @@ class Refined:
         Standard deviation of the blur, as its edges show it, px.
     saturated : float
         Part of it beside which the paper is white, as far as the picture can tell.
+    whole : bool
+        Whether edges beside white paper were moved to half of all its light.
     settled : bool
         Whether the last pass still moved nothing.
     """
@@ -91,6 +91,7 @@ class Refined:
     rough: bool
     blur: float
     saturated: float
+    whole: bool = False
     settled: bool = True
 
     @property
@@ -155,6 +156,8 @@ def refine(
             seen = _look(grey, state, sign, turn, seeking=seeking)
         if walls is not None:
             seen = to_wall_ends(state, seen, walls)
+        if sign > 0.0 and not seeking:
+            seen = to_whole_edges(grey, state, seen, walls)
         known = None if places is None or aside > _JOINTS_STILL_PX else places - first
         fit, used, aside, places = _fit(
             state, seen, first, end, joints, known, seeking=seeking,
@@ -181,7 +184,8 @@ def refine(
         sigma_width=sigma_width, tip=replace(tip, s=tip.s - first),
         clamp=None if lines is None else lines.shifted(first), rough=state.rough,
         blur=state.blur,
-        saturated=_saturated(seen) if sign > 0.0 else 0.0, settled=settled,
+        saturated=saturated(seen) if sign > 0.0 else 0.0,
+        whole=sign > 0.0 and are_cut_off(grey, seen), settled=settled,
     )  # fmt: skip
 
 
@@ -217,12 +221,6 @@ def _look(grey: Image, state: State, sign: float, turn: int, *, seeking: bool) -
     state.blur = float(np.clip(blur, 0.3, 0.5 * state.width)) if blur > 0 else 1.0
     state.scatter = _scatter(edges, int(5.0 / step))
     return Seen(s, theta, edges, good)
-
-
-def _saturated(seen: Seen) -> float:
-    """Return the part of the rod beside which the paper is as light as can be."""
-    paper = np.maximum(seen.edges.outer_low, seen.edges.outer_high)[seen.good]
-    return float(np.mean(paper > WHITE))
 
 
 def _scatter(edges: Edges, lag: int) -> float:
