@@ -8,9 +8,10 @@ above that nobody looked at before. Prints, by difficulty: how many were measure
 needless refusals, those wrong without a flag (RMS above 0.15 mm or tip above 0.5 mm),
 errors in mm, and the direction's pull in stated deviations; then how many right
 ones are doubted. ``--kind`` draws one kind only, and prints it by what was drawn (of
-blur: defocus, motion, grain, gloss, exposure). ``--page`` writes a page (index.html)
-with overlays of the ten worst and of the refused. ``--peers`` measures the same scenes
-with scikit-image and skan, whose masks are given to them (`reserve_peers`).
+blur: defocus, motion, grain, gloss, exposure; ``--defect`` draws one of these).
+``--page`` writes a page (index.html) with overlays of the ten worst and of the refused.
+``--peers`` measures the same scenes with scikit-image and skan, whose masks are given
+to them (`reserve_peers`).
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from reserve_peers import of_peers
-from reserve_scenes import KINDS, Case, draw_case
+from reserve_scenes import DEFECTS, KINDS, Case, draw_case
 
 from magbend.vision import Measurement, draw_overlay, extract, specimen_to_px
 from magbend.vision.synthetic import signed_distance
@@ -212,6 +213,7 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seed", type=int, default=9001)
     parser.add_argument("--kind", choices=KINDS, help="this kind of scene only")
+    parser.add_argument("--defect", choices=DEFECTS, help="of --kind blur, this alone")
     parser.add_argument("--page", type=Path, help="folder for overlays")
     parser.add_argument("--peers", action="store_true", help="measure with peers too")
     parser.add_argument("--quiet", action="store_true", help="the table alone")
@@ -220,7 +222,7 @@ def main() -> int:
     step = len(KINDS) if options.kind else 1
     first = KINDS.index(options.kind) if options.kind else options.first
     for index in range(first, first + step * options.count, step):
-        row = measured(draw_case(options.seed, index))
+        row = measured(draw_case(options.seed, index, defect=options.defect))
         rows.append(row)
         if options.peers:
             peers.append(of_peers(row.case))

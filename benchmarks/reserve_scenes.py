@@ -33,6 +33,8 @@ KINDS = ("plain", "light", "clutter", "telephone", "colour", "blur", "mixed")
 """Plain; hard light; things beside the rod; f = 4 mm lens and tilt; rod, paper and
 clamp of any colour; defocus, motion, grain or gloss; several of these at once."""
 
+DEFECTS = ("defocus", "motion", "grain", "gloss", "exposure")
+
 WHITE = (0.62, 0.62, 0.60)
 CREAM = (0.52, 0.64, 0.68)
 GREEN_BOARD = (0.16, 0.30, 0.10)
@@ -61,8 +63,13 @@ class Case:
         return self.scene.clamp.pose.height_mm
 
 
-def draw_case(seed: int, index: int, label: Label | None = None) -> Case:
-    """Draw a scene: the same for the same seed and index, with a tag on its clamp."""
+def draw_case(
+    seed: int, index: int, label: Label | None = None, defect: str | None = None
+) -> Case:
+    """Draw a scene: the same for the same seed and index, with a tag on its clamp.
+
+    `defect` is one of `DEFECTS` that a scene of kind "blur" is to have.
+    """
     kind = KINDS[index % len(KINDS)]
     rng = np.random.default_rng([seed, index])
     while True:
@@ -80,7 +87,7 @@ def draw_case(seed: int, index: int, label: Label | None = None) -> Case:
     elif kind == "colour":
         scene, words = _coloured(rng, scene)
     elif kind == "blur":
-        scene, words = _blurred(rng, scene)
+        scene, words = _blurred(rng, scene, defect)
     elif kind == "mixed":
         scene, words = _mixed(rng, scene, camera)
     if label is not None:
@@ -186,9 +193,10 @@ def _mixed(
     return scene, f"{words}; {more}"
 
 
-def _blurred(rng: np.random.Generator, scene: Scene) -> tuple[Scene, str]:
-    light, words = scene.light, ("defocus", "motion", "grain", "gloss", "exposure")
-    word = words[rng.integers(len(words))]
+def _blurred(
+    rng: np.random.Generator, scene: Scene, word: str | None = None
+) -> tuple[Scene, str]:
+    light, word = scene.light, word or DEFECTS[rng.integers(len(DEFECTS))]
     if word == "defocus":
         light = replace(light, blur_px=rng.uniform(1.5, 3.0))
     elif word == "motion":
