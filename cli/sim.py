@@ -211,7 +211,8 @@ def _print(data: dict[str, Any]) -> None:
         shown = ", ".join(f"{round(value, 5) + 0.0:.5f}" for value in tip)
         say(f"  tip          ({shown}) mm")
         say(f"  tip angle    {data['tip_angle_deg']:.5f} deg")
-        say(f"  root moment  {data['root_moment_Nm']:.6g} N m")
+        about = " about z" if "tip_z_mm" in data else ""
+        say(f"  root moment  {data['root_moment_Nm']:.6g} N m{about}")
         say(f"  Morse index  {data['morse_index']}")
         if data["sag_mm"] >= 5e-6:
             say(f"  sag          {data['sag_mm']:.5f} mm below the clamp")
@@ -227,6 +228,7 @@ def _print(data: dict[str, Any]) -> None:
     else:
         say("  touches the magnet at full load")
     bx, by = (round(value, 4) + 0.0 for value in data["flux_tip_mT"])
-    say(f"  flux at tip  ({bx:.4f}, {by:.4f}) mT")
+    within = " in x and y" if "tip_z_mm" in data else ""
+    say(f"  flux at tip  ({bx:.4f}, {by:.4f}) mT{within}")
     if "check_mm" in data:
         say(f"  check        least energy agrees to {data['check_mm']:.1e} mm")

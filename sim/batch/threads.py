@@ -62,6 +62,10 @@ def in_threads(
             progress(done, rows)
         return
     with ThreadPoolExecutor(workers) as pool:
-        for future in as_completed([pool.submit(do, part) for part in slices]):
-            done += future.result()
-            progress(done, rows)
+        try:
+            for future in as_completed([pool.submit(do, part) for part in slices]):
+                done += future.result()
+                progress(done, rows)
+        except BaseException:  # an interrupt too: leave the chunks that wait
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise

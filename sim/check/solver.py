@@ -186,7 +186,7 @@ def check_solve(
     elements = whole(elements, 1, 1000, "elements")
     if not support.in_plane or not field.in_plane:
         raise InputError(
-            "the check solver takes magnets and weight within the plane z = 0; instead "
+            "the check solver takes fields and weight within the plane z = 0; instead "
             f"received gravity_m_s2 {support.gravity_m_s2} m/s2 and {field}"
         )
     mesh = _mesh(specimen, elements)

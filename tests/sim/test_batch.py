@@ -11,6 +11,7 @@ from magbend.core.errors import InputError
 from magbend.core.magnet import Magnet
 from magbend.core.specimen import Section, Specimen
 from magbend.sim import MagnetField, UniformField, solve, solve_many
+from magbend.sim.batch.threads import in_threads
 from magbend.sim.batch.tips import CHUNK, OUTCOMES
 
 CUBE = Magnet.cube(55.0, 1.305)
@@ -134,6 +135,23 @@ def test_structured_arrays_and_scalars() -> None:
     for name, value in (by_name | rest).items():
         full[name] = value
     assert np.array_equal(solve_many(full), found)
+
+
+def test_an_interrupt_leaves_the_chunks_that_wait() -> None:
+    held, begun = threading.Event(), []
+
+    def work(rows: slice) -> None:
+        begun.append(rows)
+        if rows.start > 0:
+            held.wait(5.0)
+
+    def interrupted(*_: int) -> None:
+        threading.Timer(0.2, held.set).start()
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        in_threads(work, 100, 1, threads=2, progress=interrupted)
+    assert len(begun) < 10
 
 
 def test_progress_and_stop() -> None:

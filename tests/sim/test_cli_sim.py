@@ -62,6 +62,8 @@ def test_a_rod_lifted_out_of_the_plane_keeps_its_height(tmp_path: Path) -> None:
     x, y, z = solve_spatial(gmc(2), field).r_mm[-1]
     assert z > 2.0
     assert f"({x:.5f}, {y:.5f}, {z:.5f}) mm" in text
+    assert "N m about z" in text
+    assert "mT in x and y" in text
     assert "sag" not in text
     assert (*data["tip_mm"], data["tip_z_mm"]) == pytest.approx((x, y, z), abs=1e-8)
     table = np.genfromtxt(out, delimiter=",", names=True)
