@@ -19,9 +19,6 @@ from .march import K1, K3, WORK, Y, Z, all_pairs
 
 CONVERGED = 1e-9
 """Correction after which the next, by the matrix kept, is rounding."""
-PASSING = 1e-7
-"""The same at loads on the way to the full one: next to a load where a direction is
-about to become unstable, what rounding leaves is larger than `CONVERGED`."""
 CLOSE = 1e-3
 """Correction after which the coarse steps have done their part."""
 COARSE = 0.5
@@ -32,11 +29,17 @@ last march, by 2 n steps, has a new one."""
 CHORD = 4e-2
 """Correction after which the matrix is kept."""
 MIN_LOAD_STEP = 1e-7
+SHORT, PASSING = 1e-5, 1e-6
+"""Step of the load, and the correction then enough on the way to the full load: so near
+to where a direction becomes unstable rounding leaves more than `CONVERGED`."""
 SURE = 1e-6
 """Step of the load too short for a jump to another branch."""
 AGREED = 1e-3
 """Difference of two loads at which a branch ends, by n and 2 n steps, that is none."""
 MOST_STEPS = 3000.0
+LOST, STEEP = -2, 1e4
+"""Index where a branch is lost, fold or not: the root moves so many times as the tip,
+and what rounding leaves of the tip's pose no longer fixes the rest."""
 LONGEST = 0.5
 """Largest predicted move of the tip."""
 
@@ -223,7 +226,7 @@ def follow(rod, field, n, Rc, R, r, goal, J, held):  # type: ignore[no-untyped-d
         there = -1
         if _move(R, r, x) < LONGEST:
             held[3][0] = 0.0
-            end = goal if ahead == 1.0 else max(goal, PASSING)
+            end = PASSING if jump < SHORT and ahead < 1.0 else goal
             found, _, sure = newton(rod, field, ahead, n, Rc, R, r, 0.1, end, J, held)
             if found and sure:
                 there = 0
@@ -260,7 +263,7 @@ def solve_pose(rod, field, n, Rc, R, r, goal, held):  # type: ignore[no-untyped-
     Returns
     -------
     tuple
-        Morse index (-1: no equilibrium), load reached, error (dimensionless).
+        Morse index (-1: no equilibrium; `LOST`), load reached, error (dimensionless).
     """
     J, x = np.zeros((6, 6)), np.zeros((6, 1))
     coarse = COARSE * n
@@ -274,7 +277,7 @@ def solve_pose(rod, field, n, Rc, R, r, goal, held):  # type: ignore[no-untyped-
         R[:], r[:] = R0, r0
         index, load = follow(rod, field, n, Rc, R, r, goal, J, held)
         if load < 1.0:
-            return -1, load, 0.0
+            return LOST if np.max(np.abs(J)) > STEEP else -1, load, 0.0
     run(rod, field, 1.0, 2.0 * n, R, r, False, math.inf, held)
     _miss(held[0][0], Rc, x)
     error = np.sum(np.abs(x))

@@ -11,7 +11,7 @@ from ..magnet.flux import in_reach
 from ..planar.contact import touches
 from .curve import shape
 from .march import STATE, loads_on
-from .newton import room, run, solve_sure, unloaded
+from .newton import LOST, room, run, solve_sure, unloaded
 
 REACH_LIMIT = 30.0
 """Largest sum of h sqrt(P / EI): beyond, a tip's pose no longer fixes the root's."""
@@ -70,6 +70,8 @@ def _solve(rod, field, Rc, margin, box, R, r, s, states):  # type: ignore[no-unt
         return BEYOND, -1, math.nan
     n = 1.7 + 3.0 * reach + 1.4 * turn
     index, _, error, n, held = solve_sure(rod, field, n, Rc, R, r, GOAL)
+    if index == LOST:
+        return BEYOND, -1, math.nan
     if index < 0 or _meets(rod, field, margin, 2.0 * n, held[1], s, states):
         return GONE, -1, math.nan
     if _leaves(rod, 2.0 * n, held[1], box, s, states):

@@ -41,7 +41,7 @@ from ..scaling import MOST_POINTS, field_array, stations
 from ..solution import Ending, Solution
 from .law import axis
 from .march import AXIAL, K1, K3, MU1, MU2, WX, WY, WZ, H, loads_on
-from .newton import solve_rod
+from .newton import LOST, solve_rod
 from .rod import SpatialRod, SpatialSection, Vector, clamp_of, rod_table
 from .rows import REACH_LIMIT, TURN_LIMIT
 
@@ -167,6 +167,8 @@ def solve_spatial(
     InputError
         If a value cannot be, the load is out of range, the weight lacks a density, or
         the undeformed rod would touch the magnet.
+    SolverError
+        If the rod is drawn to where its load is too large to tell how it ends.
 
     Examples
     --------
@@ -219,6 +221,12 @@ def solve_table(
     n = _steps(table, flux, unloaded[-1, :3])
     rest = flux, n, clamp, margin, s
     index, load, error, states = _equilibrium(table, *rest)
+    if index == LOST:
+        raise SolverError(
+            f"the rod is drawn to a place where its load is too large for the march: "
+            f"followed up to {load:.3g} of its load, it may be pulled in or not; give "
+            "a larger gap_mm, or use `solve` where all lies within the plane"
+        )
     if index < 0:
 
         def shape_at(part: float) -> Array | None:
