@@ -195,33 +195,43 @@ def finish(
     LostError
         If there is nothing to vouch for.
     """
-    calibrated = setting.calibration is not None
-
-    def refined_from(start: Start) -> Refined:
-        return refine(
-            view.grey, start, root=candidate.root, sign=view.sign,
-            joints=setting.joints_px,
-            walls=setting.walls_px if calibrated and view.sign > 0.0 else None,
-            face_px=setting.face_px(start.curve), sd_px=sd_px,
-        )  # fmt: skip
-
-    refined = refined_from(start)
-    if not start.rough and refined.typical_width < COLLAPSED * start.width:
-        # Taken for sharp, a far blurred edge is sought between too close levels, and
-        # seems the sharper for it; from the other end its blur is found.
-        blurred = refined_from(replace(start, blur=WIDE * start.width))
-        if blurred.typical_width < COLLAPSED * start.width:
-            raise LostError(
-                "edges_lost",
-                "the rod's two edges run into each other in the blur: focus the lens",
-            )
-        refined = blurred
+    refined = _refined(view, start, candidate, setting, sd_px)
     if np.isfinite(sd_px) and not refined.settled:
         raise LostError("edges_lost", "the rod moved too far since the last frame")
     refusal(view, refined, candidate)
     result = measurement(refined, view, setting, _told(photo, setting))
     result = replace(result, inverted=view.sign < 0.0, mix=view.mix)
     return doubts(result, photo, view, refined, candidate, setting)
+
+
+def _refined(
+    view: View, start: Start, candidate: Candidate, setting: Setting, sd_px: float
+) -> Refined:
+    """Return axis, edges and ends; those of a far blurred rod from a wide blur on.
+
+    Taken for sharp, a far blurred edge is sought between too close levels, and seems
+    the sharper for it; from the other end its blur is found.
+    """
+    walls = setting.calibration is not None and view.sign > 0.0
+
+    def from_blur(blur: float) -> Refined:
+        return refine(
+            view.grey, replace(start, blur=blur), root=candidate.root, sign=view.sign,
+            joints=setting.joints_px, walls=setting.walls_px if walls else None,
+            face_px=setting.face_px(start.curve), sd_px=sd_px,
+        )  # fmt: skip
+
+    least = 0.0 if start.rough else COLLAPSED * start.width
+    refined = from_blur(start.blur)
+    if refined.typical_width >= least:
+        return refined
+    refined = from_blur(WIDE * start.width)
+    if refined.typical_width < least:
+        raise LostError(
+            "edges_lost",
+            "the rod's two edges run into each other in the blur: focus the lens",
+        )
+    return refined
 
 
 def _told(photo: Photo, setting: Setting) -> TaggedClamp | None:
