@@ -81,7 +81,7 @@ def median_profile(profiles: NDArray[np.floating]) -> Array:
     whole = profiles[np.isfinite(profiles).all(axis=1)]
     if not len(whole):
         return np.full(profiles.shape[1], np.nan)
-    return np.median(whole, axis=0).astype(np.float64)
+    return np.asarray(np.median(whole, axis=0), np.float64)
 
 
 def fit_flanks(
@@ -107,14 +107,17 @@ def fit_flanks(
         Their own light over the rod's.
     """
     count = len(light)
-    walls = np.zeros((2, count)) if wall is None else np.stack([wall, mirrored])
+    wide = np.zeros(count) if wall is None else wall
+    share = np.zeros(count) if mirrored is None else mirrored
     at = np.column_stack(
         [np.zeros(count), np.fmin.reduce(light, axis=1), np.full(count, _PAPER)]
     )
     at = np.nan_to_num(at)
 
     def misfit(at: Array, blur: float) -> Array:
-        away = (_flank(x, *at.T, blur, *walls, sky) - light) / _LEVEL_SD
+        place, rod, paper = at.T
+        whole = _flank(x, place, rod, paper, blur, wide, share, sky)
+        away = (whole - light) / _LEVEL_SD
         return np.nan_to_num(away)
 
     def cost(away: Array, at: Array) -> float:
@@ -128,11 +131,11 @@ def fit_flanks(
         slopes.append(misfit(at, blur + _STEP) - away)
         change = np.stack(slopes, axis=2) / _STEP
         step, wider = _step(change, away, at, damping, known=known)
-        to, wide = at + step, max(blur + wider, 0.7 * blur)
-        there = misfit(to, wide)
+        to, blurred = at + step, max(blur + wider, 0.7 * blur)
+        there = misfit(to, blurred)
         if (less := cost(there, to)) < best:
             done = best - less < 1e-4 * best
-            at, blur, away, best = to, wide, there, less
+            at, blur, away, best = to, blurred, there, less
             damping = max(0.2 * damping, 1e-6)
             if done:
                 break

@@ -76,5 +76,5 @@ def _sides(
         _sample(grey, points, normals, edge, outwards, before, np.float32(1.0), strip)
         strip[~seen.good] = np.nan
         out += [median_profile(strip[piece]) for piece in pieces]
-    x = (np.arange(strip.shape[1]) - before + 0.5) * STEP_PX
+    x = np.asarray((np.arange(strip.shape[1]) - before + 0.5) * STEP_PX, np.float64)
     return x, np.array(out)
