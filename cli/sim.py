@@ -229,6 +229,7 @@ def _print(data: dict[str, Any]) -> None:
         say("  touches the magnet at full load")
     bx, by = (round(value, 4) + 0.0 for value in data["flux_tip_mT"])
     within = " in x and y" if "tip_z_mm" in data else ""
-    say(f"  flux at tip  ({bx:.4f}, {by:.4f}) mT{within}")
+    straight = "" if "tip_mm" in data else ", where the tip of the straight rod is"
+    say(f"  flux at tip  ({bx:.4f}, {by:.4f}) mT{within}{straight}")
     if "check_mm" in data:
         say(f"  check        least energy agrees to {data['check_mm']:.1e} mm")

@@ -188,7 +188,7 @@ def _print(name: str, found: Followed, files: list[Path | None]) -> None:
         )
     lost = sum(one.centreline is None for one in found.points)
     if not found.folds and not lost:
-        say("  no fold: the rod goes back the way it came")
+        say("  no fold: it would go back the way it came")
     if lost:
         say(f"  pulled in at {lost} points")
     if found.dissipated_uJ > 0.0:

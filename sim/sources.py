@@ -20,7 +20,7 @@ from ..core.magnet import Vector
 from ..core.plugins import load_plugin
 from ..core.sources import Coil, Cuboid, Cylinder, Dipole, Gradient, Source, Uniform
 from ..core.specimen_file import read_magnet
-from ..core.toml import FileModel, read_toml, wrong_key
+from ..core.toml import FileModel, read_text, read_toml, wrong_key
 from .fields import Field, cuboid_of
 from .magnet.map import FieldMap, read_map, sampled_map
 
@@ -130,7 +130,7 @@ def read_field(path: Path) -> Field:
     ConfigError
         One sentence with file and key.
     """
-    text = path.read_text(encoding="utf-8-sig") if path.is_file() else ""
+    text = read_text(path)
     if "[[source]]" not in text and '"source"' not in text:
         return Field(cuboid_of(read_magnet(path)))
     tables = read_toml(path, _FieldFile).source

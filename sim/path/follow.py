@@ -227,6 +227,7 @@ class _Walk:
         self.dissipated_uJ = 0.0
         self.lost_uJ = 0.0  # in the last step; NaN if there was no shape to lose to
         self.u: Array | None = None
+        self.behind: tuple[float, Array] | None = None  # where it was just before
         self.index = 0
         self.is_begun = False
 
@@ -254,9 +255,10 @@ class _Walk:
         at, jump, before = a, b - a, self.u
         while at != b:
             ahead = b if abs(b - at) <= abs(jump) else at + jump
-            index, u, _ = self._settle(ahead, self.s[[0, -1]])
+            index, u, _ = self._settle(ahead, self.s[[0, -1]], self._guess(at, ahead))
             if index == self.index:
-                before, self.u, at = self.u, u, ahead
+                before, self.behind = self.u, (at, self.u)
+                self.u, at = u, ahead
                 jump *= 2.0
                 continue
             jump *= 0.5
@@ -270,6 +272,19 @@ class _Walk:
             self.index, self.u, at, jump = index, u, ahead, b - a
         return self._point(b)
 
+    def _guess(self, at: float, ahead: float) -> Array:
+        """Return where Newton begins: straight on, but no farther than twice as far.
+
+        A rod many boundary layers long lets Newton converge from next to nothing away;
+        from where the rod was, its steps would be as small as that.
+        """
+        u = np.array(self.u)
+        if self.behind is not None:
+            value, before = self.behind
+            if at != value and abs(ratio := (ahead - at) / (at - value)) <= 2.0:
+                u += ratio * (u - before)
+        return u
+
     def _arrays(self, value: float) -> tuple[Array, Array, float, float]:
         specimen, field, support = self.case(value)
         L = specimen.length_mm
@@ -277,9 +292,12 @@ class _Walk:
         margin = 0.5 * max(specimen.sides_mm) / L
         return rod_array(specimen, support), field_array(field, L), clamp, margin
 
-    def _settle(self, value: float, s: Array) -> tuple[int, Array, Array]:
+    def _settle(
+        self, value: float, s: Array, guess: Array | None = None
+    ) -> tuple[int, Array, Array]:
         """Return index (below 0: none), unknowns and shape next to where the rod is."""
-        u, out = np.array(self.u), np.empty((4, len(s)))
+        u = np.array(self.u if guess is None else guess)
+        out = np.empty((4, len(s)))
         index = settle(
             *self._arrays(value), np.ascontiguousarray(s), ORDER, STEP, u, out
         )
@@ -290,7 +308,8 @@ class _Walk:
         index, _, out = self._settle(value, self.s)
         if index == LOST:
             raise SolverError(
-                f"the path was lost at {value:.6g}; try more steps, and please report"
+                f"the path was lost at {value:.6g}: Newton's method does not find its "
+                "shape again there; try more steps, or solve each place alone"
             )
         refuse_outside(field, out[0], out[1], specimen.length_mm)
         line = self._line(out, specimen)
@@ -303,6 +322,7 @@ class _Walk:
     def _snap(self, at: float, b: float, kind: str, before: Array) -> PathPoint:
         """Return where the rod is at `b` after its equilibrium has ended at `at`."""
         last = self._note(at, b, kind, before)
+        self.behind = None
         point = self.start(b, snapped=True)
         other = self._nearest_uniform(b, last)
         if other is not None:

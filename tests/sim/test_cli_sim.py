@@ -121,6 +121,7 @@ def test_pulled_in_has_no_shape_to_write(tmp_path: Path) -> None:
     assert RUN.invoke(sim.app, without).exit_code == 2
     case = ("shape", "--specimen", str(rod), "--magnet", str(magnet), "--gap-mm", "20")
     assert "pulled in: no equilibrium" in run(*case)
+    assert ", where the tip of the straight rod is" in run(*case)
     out = tmp_path / "shape.csv"
     with pytest.raises(SolverError, match="no shape to write"):
         run(*case, "--out", str(out))
@@ -160,6 +161,13 @@ def test_wrong_usage_ends_with_2(arguments: tuple[str, ...]) -> None:
 def test_mistakes_are_sentences(arguments: tuple[str, ...], pattern: str) -> None:
     with pytest.raises((InputError, ConfigError), match=pattern):
         run("shape", *arguments)
+
+
+def test_a_source_file_of_bytes_is_refused_in_a_sentence(tmp_path: Path) -> None:
+    file = tmp_path / "bytes.toml"
+    file.write_bytes(b"\xff\xd6")
+    with pytest.raises(ConfigError, match="is not a text file"):
+        run("shape", "--gmc", "2", "--magnet", str(file))
 
 
 def test_the_sentence_is_printed_and_the_exit_code_is_1(

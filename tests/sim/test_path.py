@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -15,7 +16,11 @@ from magbend.cli import sim as cli
 from magbend.core.errors import InputError
 from magbend.core.units import MU0
 from magbend.sim import (
+    Coil,
     Cuboid,
+    Cylinder,
+    Dipole,
+    Field,
     PathPoint,
     Rod,
     Section,
@@ -26,8 +31,10 @@ from magbend.sim import (
     gmc,
     solve,
 )
+from magbend.sim.path import follow
 from magbend.sim.path.draw import animate_path, draw_path, path_csv
 from magbend.sim.path.energy import energy_uJ
+from magbend.sim.planar.near import settle
 
 BAR = Rod(
     name="bar", side_mm=1.0, remanence_mT=20.0,
@@ -73,6 +80,43 @@ def test_without_fold_each_point_is_that_of_solve_there_and_back() -> None:
         np.testing.assert_allclose(
             point.centreline.tip_mm, solve(gmc(2), field).centreline.tip_mm, atol=1e-9
         )
+
+
+def test_a_rod_of_many_boundary_layers_is_followed_in_few_steps(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rod = Rod(
+        name="wavy", shape="round", diameter_mm=0.8, remanence_mT=60.0,
+        sections=(
+            Section(length_mm=12.0, E_MPa=4.0),
+            Section(length_mm=10.0, E_MPa=2.0, remanence_mT=-30.0),
+            Section(length_mm=15.0, E_MPa=1.5),
+        ),
+    )  # fmt: skip
+    field = Field(
+        Cylinder(
+            diameter_mm=40.0, length_mm=30.0, remanence_T=1.3, axis_angle_deg=30.0,
+            gap_mm=40.0,
+        ),
+        Coil(diameter_mm=80.0, current_A=5.0, turns=200, centre_mm=(0.0, -40.0, 0.0)),
+        Uniform(flux_mT=-2.0),
+        Dipole(moment_A_m2=3.0, centre_mm=(60.0, 50.0, 0.0), axis_angle_deg=200.0),
+    )  # fmt: skip
+    settled = []
+
+    def counted(*case: object) -> int:
+        settled.append(case)
+        return settle(*case)
+
+    monkeypatch.setattr(follow, "settle", counted)
+    path = follow_path(rod, field, offset_x_mm=(75.0, 70.0), steps=5)
+    assert not path.folds
+    assert len(settled) < 2_000  # 15 000 where Newton begins from where the rod was
+    placed = replace(field.sources[0], offset_mm=(70.0, 0.0, 0.0))
+    alone = solve(rod, Field(placed, *field.sources[1:]))
+    assert path.points[-1].centreline.tip_mm == pytest.approx(
+        alone.centreline.tip_mm, abs=1e-6
+    )
 
 
 def test_the_work_of_a_loop_is_the_torque_on_what_turns_it_and_is_dissipated() -> None:
