@@ -36,7 +36,9 @@ SURE = 1e-6
 """Step of the load too short for a jump to another branch."""
 AGREED = 1e-3
 """Difference of two loads at which a branch ends, by n and 2 n steps, that is none."""
-MOST_STEPS = 3000.0
+MOST_STEPS = 800.0
+MOST_LOADS = 600
+"""Trials of a load on one way; a branch that asks for more is lost."""
 LOST, STEEP = -2, 1e4
 """Index where a branch is lost, fold or not: the root moves so many times as the tip,
 and what rounding leaves of the tip's pose no longer fixes the rest."""
@@ -218,7 +220,9 @@ def follow(rod, field, n, Rc, R, r, goal, J, held):  # type: ignore[no-untyped-d
     Rb, rb = R.copy(), r.copy()
     secant, x = np.zeros((6, 1)), np.zeros((6, 1))
     load, jump, index = 0.0, 0.125, 0
-    while load < 1.0:
+    for _ in range(MOST_LOADS):
+        if load == 1.0:
+            return index, 1.0
         jump = min(jump, 1.0 - load)
         ahead = 1.0 if jump == 1.0 - load else load + jump
         Rb[:], rb[:] = R, r
@@ -243,7 +247,7 @@ def follow(rod, field, n, Rc, R, r, goal, J, held):  # type: ignore[no-untyped-d
             jump *= 0.5
             if jump < MIN_LOAD_STEP:
                 return index, load
-    return index, 1.0
+    return index if load == 1.0 else LOST, load
 
 
 @njit(cache=True)
@@ -277,7 +281,8 @@ def solve_pose(rod, field, n, Rc, R, r, goal, held):  # type: ignore[no-untyped-
         R[:], r[:] = R0, r0
         index, load = follow(rod, field, n, Rc, R, r, goal, J, held)
         if load < 1.0:
-            return LOST if np.max(np.abs(J)) > STEEP else -1, load, 0.0
+            lost = index == LOST or np.max(np.abs(J)) > STEEP
+            return LOST if lost else -1, load, 0.0
     run(rod, field, 1.0, 2.0 * n, R, r, False, math.inf, held)
     _miss(held[0][0], Rc, x)
     error = np.sum(np.abs(x))
