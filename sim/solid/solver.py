@@ -22,11 +22,11 @@ marched in space (`space`).
 from __future__ import annotations
 
 from ...core.checks import within
-from ...core.errors import InputError
+from ...core.errors import InputError, SolverError
 from ...core.specimen import Specimen
 from ..fields import PULLED_IN, Field, Support, as_field, check_case, check_plain
 from ..solution import Solution
-from ..spatial.solver import solve_spatial
+from ..spatial.solver import SpatialSolution, solve_spatial
 from .plane import solve_in_plane
 from .space import largest_strain, solve_in_space
 
@@ -82,18 +82,31 @@ def solve_solid(
         solution, strain = solve_in_plane(specimen, field, support, ratio, points)
         if strain <= SMALL_STRAIN:
             return solution
+        if strain > 2.0 * STRAIN_LIMIT:  # whatever finer steps would say
+            raise _too_strained(strain, STRAIN_LIMIT)
     elif not all(across.is_isotropic for across in specimen.cross_sections):
         limit = TWISTED_LIMIT
-    found = shape = solve_in_space(specimen, field, support, ratio, points)
-    if found.status == PULLED_IN:
+    found: SpatialSolution | SolverError
+    try:
+        found = solve_in_space(specimen, field, support, ratio, points)
+    except SolverError as error:
+        found = error
+    shape = found
+    if isinstance(shape, SolverError) or shape.status == PULLED_IN:
         # Where the law softens beyond its range a solid may seem to give way.
         shape = solve_spatial(specimen, field, support=support)
     strain = largest_strain(specimen, support, shape)
     if strain > limit:
-        twisted = " of rectangles out of the plane" if limit < STRAIN_LIMIT else ""
-        raise InputError(
-            f"the largest strain{twisted} must be below {limit:g} for the solid model; "
-            f"instead received {strain:.3g}: the rod is too thick or too soft for a "
-            "rod model; model 'rod' gives a rough answer"
-        )
+        raise _too_strained(strain, limit)
+    if isinstance(found, SolverError):
+        raise found
     return found.seen_from_above()
+
+
+def _too_strained(strain: float, limit: float) -> InputError:
+    twisted = " of rectangles out of the plane" if limit < STRAIN_LIMIT else ""
+    return InputError(
+        f"the largest strain{twisted} must be below {limit:g} for the solid model; "
+        f"instead received {strain:.3g}: the rod is too thick or too soft for a "
+        "rod model; model 'rod' gives a rough answer"
+    )

@@ -222,10 +222,11 @@ def solve_table(
     rest = flux, n, clamp, margin, s
     index, load, error, states = _equilibrium(table, *rest)
     if index == LOST:
+        way_out = "a weaker field" if flux[0] == UNIFORM else "a larger gap_mm"
         raise SolverError(
-            f"the rod is drawn to a place where its load is too large for the march: "
+            f"the rod comes to a place where its load is too large for the march: "
             f"followed up to {load:.3g} of its load, it may be pulled in or not; give "
-            "a larger gap_mm, or use `solve` where all lies within the plane"
+            f"{way_out}, or use `solve` where all lies within the plane"
         )
     if index < 0:
 

@@ -107,7 +107,6 @@ def test_curved_and_tilted_rods_are_solved_in_space_and_refused_elsewhere(
     straight = solve(rod(), field).centreline.tip_mm
     assert math.dist(space.r_mm[-1, :2], straight) > 0.5
     for task in (
-        lambda: sensitivities(one, field, parameters=["E_MPa[0]"]),
         lambda: follow_path(one, field, load_factor=(0.5, 1.0)),
         lambda: find_equilibria(one, field),
     ):
