@@ -36,10 +36,10 @@ SURE = 1e-6
 """Step of the load too short for a jump to another branch."""
 AGREED = 1e-3
 """Difference of two loads at which a branch ends, by n and 2 n steps, that is none."""
-MOST_STEPS = 800.0
-MOST_LOADS = 600
+MOST_STEPS = 3000.0
+MOST_LOADS = 4000
 """Trials of a load on one way; a branch that asks for more is lost."""
-LOST, STEEP = -2, 1e4
+LOST, STEEP = -2, 1e6
 """Index where a branch is lost, fold or not: the root moves so many times as the tip,
 and what rounding leaves of the tip's pose no longer fixes the rest."""
 LONGEST = 0.5

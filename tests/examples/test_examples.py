@@ -15,6 +15,7 @@ import pytest
 from magbend import sim
 from magbend.analysis.compare.metrics import fit_circle
 from magbend.analysis.twin.bench import hide
+from magbend.core.magnet import Magnet
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
@@ -71,7 +72,9 @@ def test_the_magnet_predicts_the_twin_better_than_a_uniform_field(folder: Path) 
 def test_the_fit_finds_the_twins_hidden_moduli(folder: Path) -> None:
     fit = example("fit_the_stiffness").main(folder)
     seed = example("run_the_twin_bench").SEED
-    truth = hide(sim.gmc(2), fit.problem.shots[0].field.magnet, seed=seed)
+    (cube,) = fit.problem.shots[0].field.sources
+    magnet = Magnet(sides_mm=cube.sides_mm, remanence_T=cube.remanence_T)
+    truth = hide(sim.gmc(2), magnet, seed=seed)
     for i, section in enumerate(truth.specimen.sections):
         low, high = fit.interval_MPa(i)
         assert low < section.E_MPa < high
