@@ -157,7 +157,7 @@ from .library.space import (
 from .library.sql import (
     ask as ask,
 )
-from .lumen.run import (
+from .lumen.in_lumen import (
     InLumen as InLumen,
 )
 from .lumen.run import (

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,9 +11,7 @@ from ...core.files import write_bytes
 from ...sim.navigate import outline
 from ..figures.style import BAD, FAINT, INK, MAGNET
 from .expect import fed_mm_of, fed_steps, step_at
-
-if TYPE_CHECKING:
-    from .run import InLumen
+from .in_lumen import InLumen
 
 
 def draw(path: Path, result: InLumen) -> None:

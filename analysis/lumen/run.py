@@ -7,7 +7,6 @@ Writes, beside what ``vision extract`` writes, the columns of the lumen into
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,9 +17,8 @@ from ...core.errors import ConfigError
 from ...core.files import write_text
 from ...core.specimen_file import SpecimenModel
 from ...rig import read_run
-from ...sim.navigate import Lumen, Passage, lumen_of
+from ...sim.navigate import lumen_of
 from ...vision import (
-    Placed,
     Setting,
     extract_files,
     read_bare,
@@ -28,18 +26,10 @@ from ...vision import (
     read_centrelines,
     read_edges,
 )
-from ..runs.data import RunData
 from ..runs.load import load_run
 from .contacts import Fed, fed
-from .expect import (
-    Agreement,
-    agreement,
-    fed_mm_of,
-    fed_steps,
-    gates_passed,
-    simulated,
-    step_at,
-)
+from .expect import agreement, fed_mm_of, fed_steps, simulated, step_at
+from .in_lumen import InLumen
 from .place import place
 
 if TYPE_CHECKING:
@@ -50,39 +40,6 @@ POINTS = ("lumen_x_mm", "lumen_y_mm", "lumen_s_mm", "wall", "wall_gap_mm",
           "wall_gap_sd_mm", "contact")  # fmt: skip
 FRAMES = ("fed_mm", "contacts", "contact_walls", "contact_s_mm")
 """Columns that a lumen adds to ``centrelines.csv`` and ``frames.csv``."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InLumen:
-    """What a run in a lumen gave.
-
-    Parameters
-    ----------
-    run : RunData
-        The run, with its centrelines.
-    lumen, placed : Lumen, Placed
-        The channel, and where it lies.
-    fed : dict of str to Fed
-        The rod in each photograph that could be measured.
-    passage : Passage
-        The simulated rod's way.
-    agreements : dict of str to Agreement
-        Of the photographs whose insertion the simulated rod reached.
-    """
-
-    run: RunData
-    lumen: Lumen
-    placed: Placed
-    fed: dict[str, Fed]
-    passage: Passage
-    agreements: dict[str, Agreement]
-
-    @property
-    def gates(self) -> list[str]:
-        """Gates that the measured tip passed from photograph to photograph."""
-        seen = [self.fed.get(step.image) for step in fed_steps(self.run)]
-        tips = [tuple(one.points_mm[-1].tolist()) for one in seen if one is not None]
-        return gates_passed(self.lumen, tips)
 
 
 def measure_in_lumen(
