@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -64,7 +65,38 @@ def column(name: str, values: ArrayLike) -> Array:
     return array
 
 
-def check_magnet(magnet: object) -> None:
+def at_most(few: int) -> Callable[..., bool]:
+    """Return what tells whether the columns of designs hold so few numbers.
+
+    Plain Python gets through those before compiling is done.
+    """
+
+    def fits(designs: Any, **_options: object) -> bool:
+        try:
+            names = designs.dtype.names if isinstance(designs, np.ndarray) else designs
+            return max(np.size(designs[name]) for name in names) <= few
+        except (TypeError, KeyError, IndexError, ValueError):
+            return True  # the solver tells what is wrong with them
+
+    return fits
+
+
+def check_source(magnet: object) -> None:
+    """Refuse what is neither a magnet nor a field.
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    """
+    if not isinstance(magnet, (Magnet, Field)):
+        raise InputError(
+            "magnet must be a Magnet in mm and T, or a Field of sources; instead "
+            f"received {shown(magnet)}"
+        )
+
+
+def check_magnet(magnet: Magnet | Field) -> None:
     """Refuse what is no magnet, or none that bends rods within their plane.
 
     Raises
@@ -72,6 +104,7 @@ def check_magnet(magnet: object) -> None:
     InputError
         If it is either.
     """
+    check_source(magnet)
     if isinstance(magnet, Field):
         if not magnet.in_plane:
             raise InputError(
@@ -79,11 +112,6 @@ def check_magnet(magnet: object) -> None:
                 f"elevation_deg and z in mm of 0; instead received {shown(magnet)}"
             )
         return
-    if not isinstance(magnet, Magnet):
-        raise InputError(
-            "magnet must be a Magnet in mm and T, or a Field of sources; instead "
-            f"received {shown(magnet)}"
-        )
     if magnet.elevation_deg != 0.0 or magnet.offset_mm[2] != 0.0:
         raise InputError(
             "magnet elevation_deg in deg and offset_mm[2] in mm must be 0 for batches, "

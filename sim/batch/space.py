@@ -10,12 +10,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import shown, whole, within
+from ...core.checks import shown, within
 from ...core.cross_section import ALL_SIZES, torsion_constant_mm4
 from ...core.errors import InputError
 from ...core.jit import plain_first
@@ -28,7 +27,7 @@ from ..scaling import direction, field_rows, uniform_rows
 from ..spatial.march import AXIAL, C1, C2, C3, K2, MU1, MU2, WIDTH, WX, WZ, H
 from ..spatial.rod import clamp_of
 from ..spatial.rows import BEYOND, solve_rods
-from .columns import columns_of
+from .columns import at_most, check_source, columns_of
 from .threads import in_threads
 
 Array = NDArray[np.float64]
@@ -49,15 +48,7 @@ FEW = 10
 """Designs that plain Python gets through in about a second."""
 
 
-def _are_few(designs: Any, **_options: object) -> bool:
-    """Tell whether so few designs are given that compiling takes longer."""
-    try:
-        return max(np.size(designs[name]) for name in designs) <= FEW
-    except (TypeError, KeyError, IndexError, ValueError):
-        return True  # solve_spatial_many tells what is wrong with them
-
-
-@plain_first(solve_rods, _are_few)
+@plain_first(solve_rods, at_most(FEW))
 def solve_spatial_many(
     designs: Mapping[str, ArrayLike] | NDArray[np.void],
     *,
@@ -122,8 +113,6 @@ def solve_spatial_many(
     for name in (*TIPS, "error_mm"):
         out[name] = np.nan
     out["outcome"], out["morse_index"] = BEYOND, -1
-    if threads is not None:
-        threads = whole(threads, 1, 1024, "threads")
     clamp, box_mm = clamp_of(support), _box_mm(field)
 
     def work(rows: slice) -> None:
@@ -149,11 +138,8 @@ def _columns(
     magnet: Magnet | Field | None,
     support: Support,
 ) -> dict[str, Array]:
-    if magnet is not None and not isinstance(magnet, (Magnet, Field)):
-        raise InputError(
-            "magnet must be a Magnet in mm and T, or a Field of sources; instead "
-            f"received {shown(magnet)}"
-        )
+    if magnet is not None:
+        check_source(magnet)
     turns = {"angle_deg", "elevation_deg"} if magnet is None else set()
     columns = columns_of(designs, magnet, MORE | turns)
     if any(support.gravity_m_s2) and "density_kg_m3" not in columns:

@@ -12,6 +12,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, as_completed
 
+from ...core.checks import whole
 from ...core.progress import Progress, silent
 
 
@@ -40,14 +41,19 @@ def in_threads(
     rows, chunk : int
         How many there are, and how many a call takes.
     threads : int, optional
-        All cores, by default.
+        From 1 to 1024; all cores, by default.
     progress : callable
         Called as ``progress(done, rows)``, from this thread.
     stop : callable, optional
         Asked before each chunk; once it says True the rest is left.
+
+    Raises
+    ------
+    InputError
+        If `threads` cannot be.
     """
+    workers = cores() if threads is None else whole(threads, 1, 1024, "threads")
     slices = [slice(at, min(at + chunk, rows)) for at in range(0, rows, chunk)]
-    workers = threads or cores()
 
     def do(part: slice) -> int:
         if stop is not None and stop():

@@ -8,12 +8,10 @@ shapes instead of tips see `batch.shapes.solve_shapes`.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.checks import whole
 from ...core.cross_section import ALL_SIZES
 from ...core.jit import plain_first
 from ...core.magnet import Magnet
@@ -23,7 +21,7 @@ from ..magnet.field import magnet_block
 from ..planar.outcomes import OK_UNSTABLE, TOUCHES
 from ..planar.solver import solve_planar_rows
 from ..scaling import direction, field_rows, many_rods, uniform_rows
-from .columns import check_magnet, columns_of
+from .columns import at_most, check_magnet, columns_of
 from .lanes import HARD, solve_lanes
 from .threads import in_threads
 
@@ -47,21 +45,11 @@ RESULT = np.dtype(
 CHUNK = 4096
 _ORDER = 12
 _STEP = 0.4
-_MOST_THREADS = 1024
 FEW = 1000
 """Numbers in a column that plain Python gets through in about a second."""
 
 
-def _are_few(designs: Any, **_options: object) -> bool:
-    """Tell whether so few designs are given that compiling takes longer."""
-    try:
-        names = designs.dtype.names if isinstance(designs, np.ndarray) else designs
-        return max(np.size(designs[name]) for name in names) <= FEW
-    except (TypeError, KeyError, IndexError, ValueError):
-        return True  # solve_many tells what is wrong with them
-
-
-@plain_first(solve_lanes, _are_few)
+@plain_first(solve_lanes, at_most(FEW))
 def solve_many(
     designs: Mapping[str, ArrayLike] | NDArray[np.void],
     *,
@@ -119,8 +107,6 @@ def solve_many(
     for name in RESULT.names or ():
         out[name] = np.nan if name not in ("outcome", "morse_index") else -1
     out["outcome"] = NOT_SOLVED
-    if threads is not None:
-        threads = whole(threads, 1, _MOST_THREADS, "threads")
 
     def work(rows: slice) -> None:
         _solve_chunk({k: v[rows] for k, v in columns.items()}, magnet, out[rows])
