@@ -14,6 +14,7 @@ import numpy as np
 
 from ...core.jit import njit
 from ..magnet.flux import PART, blocked, is_uniform
+from ..tube.linear import factored, substitute
 from .exchange import look, prune, sort_kinds, strayed
 from .rod import Bent, bend, own_energy, own_gradient, own_stiffness
 from .touch import MOST, anchor, locate, touch_energy, touch_gradient
@@ -39,40 +40,10 @@ PATIENCE, FROZEN = 6, 20
 none is added. So the set cannot cycle."""
 LONGEST = 0.4
 """Most that an angle may change in one step, in rad."""
+PIVOT = 1e-14
+"""Share of a diagonal that must be left of it, for a matrix to be positive."""
 SMALL = 1e-11
 """Newton's step after which it is at rest."""
-
-
-@njit(**PART, fastmath={"contract", "reassoc"})
-def factor(H, first, last, L):  # type: ignore[no-untyped-def]
-    """Factor rows and columns `first` to `last` of H; return whether it could."""
-    for i in range(first, last):
-        for j in range(first, i):
-            total = H[i, j]
-            for k in range(first, j):
-                total -= L[i, k] * L[j, k]
-            L[i, j] = total / L[j, j]
-        total = H[i, i]
-        for k in range(first, i):
-            total -= L[i, k] * L[i, k]
-        if not total > 1e-14 * abs(H[i, i]):
-            return False
-        L[i, i] = math.sqrt(total)
-    return True
-
-
-@njit(**PART)
-def solve(L, first, last, b):  # type: ignore[no-untyped-def]
-    """Replace b by the solution of L L^T x = b."""
-    for i in range(first, last):
-        total = b[i]
-        for k in range(first, i):
-            total -= L[i, k] * b[k]
-        b[i] = total / L[i, i]
-    for i in range(last - 1, first - 1, -1):
-        b[i] /= L[i, i]
-        for k in range(first, i):
-            b[k] -= L[i, k] * b[i]
 
 
 @njit(**PART)
@@ -109,14 +80,14 @@ def add_grip(rod, bent, held, stiff, px, py, ax, ay, g, H):  # type: ignore[no-u
 
 
 @njit(**PART)
-def way_down(H, K, L, last, d):  # type: ignore[no-untyped-def]
-    """Set d to a step; return 0 if H is positive, else how much bending was added."""
+def way_down(H, K, L, last):  # type: ignore[no-untyped-def]
+    """Factor H into L; return 0 if H is positive, else how much bending was added."""
     shift = 0.0
     for _ in range(60):
         if shift > 0.0:
             for i in range(1, last):
                 H[i, i] += 0.75 * shift * K[i]
-        if factor(H, 1, last, L):
+        if factored(H, 1, last, PIVOT, L):
             break
         shift = 0.01 if shift == 0.0 else 4.0 * shift
     return shift
@@ -128,7 +99,7 @@ def softest(L, K, last, d):  # type: ignore[no-untyped-def]
     for i in range(1, last):
         d[i] = 1.0 + 0.3 * math.sin(1.7 * i) if i % 3 == 0 else 0.0
     for _ in range(8):
-        solve(L, 1, last, d)
+        substitute(L, 1, last, d)
         most = 0.0
         for i in range(1, last):
             most = max(most, abs(d[i]))
@@ -158,12 +129,12 @@ def newton(rod, field, walls, half, u, bent, t, stiff, held, before, work):  # t
         if rod.grip[0] != 0.0:
             add_grip(rod, bent, held, stiff, px, py, ax, ay, g, H)
         own_stiffness(rod, bent, px, py, H, K)
-        shift = way_down(H, K, L, last, d)
+        shift = way_down(H, K, L, last)
         if shift > 0.0:
             unstable += 1
         for i in range(1, last):
             d[i] = -g[i]
-        solve(L, 1, last, d)
+        substitute(L, 1, last, d)
         size = 0.0
         fall = 0.0
         for i in range(1, last):

@@ -25,18 +25,21 @@ that what is soft stays soft."""
 
 
 @njit(**PART, fastmath={"contract", "reassoc"})
-def _factored(H, L):  # type: ignore[no-untyped-def]
-    """Factor all but the clamp; return whether it could."""
-    for i in range(FIRST, H.shape[0]):
-        for j in range(FIRST, i):
+def factored(H, first, last, least, L):  # type: ignore[no-untyped-def]
+    """Factor rows and columns `first` to `last` of H into L; return whether it could.
+
+    It cannot where a pivot is not above `least` times what stood there.
+    """
+    for i in range(first, last):
+        for j in range(first, i):
             total = H[i, j]
-            for k in range(FIRST, j):
+            for k in range(first, j):
                 total -= L[i, k] * L[j, k]
             L[i, j] = total / L[j, j]
         total = H[i, i]
-        for k in range(FIRST, i):
+        for k in range(first, i):
             total -= L[i, k] * L[i, k]
-        if not total > 0.0:
+        if not total > least * abs(H[i, i]):
             return False
         L[i, i] = math.sqrt(total)
     return True
@@ -51,26 +54,31 @@ def factor(H, K, trace, L):  # type: ignore[no-untyped-def]
         for i in range(FIRST, H.shape[0]):
             H[i, i] += more * K[i]
         added += more
-        if _factored(H, L):
+        if factored(H, FIRST, H.shape[0], 0.0, L):
             break
         shift = LEAST if shift == 0.0 else GROWS * shift
     return shift
+
+
+@njit(**PART)
+def substitute(L, first, last, b):  # type: ignore[no-untyped-def]
+    """Replace b from `first` to `last` by the solution of L L^T x = b."""
+    for i in range(first, last):
+        total = b[i]
+        for k in range(first, i):
+            total -= L[i, k] * b[k]
+        b[i] = total / L[i, i]
+    for i in range(last - 1, first - 1, -1):
+        b[i] /= L[i, i]
+        for k in range(first, i):
+            b[k] -= L[i, k] * b[i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def solve(L, b):  # type: ignore[no-untyped-def]
     """Replace b by the solution of L L^T x = b, 0 at the clamp."""
     b[:FIRST] = 0.0
-    n = b.shape[0]
-    for i in range(FIRST, n):
-        total = b[i]
-        for k in range(FIRST, i):
-            total -= L[i, k] * b[k]
-        b[i] = total / L[i, i]
-    for i in range(n - 1, FIRST - 1, -1):
-        b[i] /= L[i, i]
-        for k in range(FIRST, i):
-            b[k] -= L[i, k] * b[i]
+    substitute(L, FIRST, b.shape[0], b)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract", "reassoc"})
