@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +15,7 @@ if TYPE_CHECKING:
 def specimen_of(path: Path | None, run: Path | None) -> Specimen | None:
     """Return the rod of a file, else of a run; None where neither tells."""
     from ..core import read_specimen
+    from ..core.json import read_json
     from ..core.specimen_file import SpecimenModel
 
     if path is not None:
@@ -23,9 +23,9 @@ def specimen_of(path: Path | None, run: Path | None) -> Specimen | None:
     if run is None:
         return None
     try:
-        record = json.loads((run / "run.json").read_text(encoding="utf-8"))
+        record = read_json(run / "run.json")
         return SpecimenModel.model_validate(record["specimen"]).specimen()
-    except (OSError, ValueError, KeyError, TypeError, InputError):
+    except (ValueError, KeyError):
         return None  # the run says so itself, to whoever reads it as a run
 
 

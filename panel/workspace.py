@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..core.errors import ConfigError, InputError, MagbendError
+from ..core.json import read_json
 from ..core.specimen import Specimen
 from ..core.specimen_file import read_specimen
 
@@ -29,7 +29,7 @@ def now_name() -> str:
     return f"{datetime.now().astimezone():%Y-%m-%d_%H%M%S}"
 
 
-_FIT_BYTES = 20_000_000
+_FIT_MB = 20.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -183,12 +183,10 @@ def _stamp(path: Path) -> tuple[float, int]:
 def _moduli(path: Path, specimen: Specimen) -> list[float] | None:
     """Return the moduli in a fit's file, or None if it does not know them all."""
     try:
-        if path.stat().st_size > _FIT_BYTES:
-            return None
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = read_json(path, most_MB=_FIT_MB)
         values = [float(value) for value in data["E_MPa"]]
         of = data["specimen"]
-    except (OSError, ValueError, TypeError, KeyError):
+    except (ValueError, TypeError, KeyError):
         return None
     known = len(values) == len(specimen.sections) and all(v > 0.0 for v in values)
     return values if known and of == specimen.name else None

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from ...core.columns import split_unit
 from ...core.errors import ConfigError, InputError, StoreError
 from ...core.files import write_text
+from ...core.json import parse_json
 from ...core.specimen import Specimen
 from ...core.units import unit_factor
 from ...sim import Designs, solve_shapes
@@ -211,7 +212,7 @@ def load_correction(path: Path) -> Correction:
         If the file is missing, damaged, or no correction.
     """
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = parse_json(path.read_bytes())
         low, high = data["bend_rad"]
         a, b = data["degree"]
         coefficients = np.array(data["coefficients"], dtype=np.float64)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
-from ...core.errors import MagbendError
+from ...core.errors import ConfigError, MagbendError
+from ...core.json import read_json
 from ..workspace import Workspace
 from .plan_file import flux_mT
 
@@ -146,11 +146,11 @@ def _step(step: dict[str, Any]) -> dict[str, Any]:
 
 def _fit(folder: Path) -> dict[str, Any] | None:
     try:
-        data = json.loads((folder / "fit.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        data = read_json(folder / "fit.json")
+    except ConfigError:
         return None
     keys = (
         "verdict", "p_value", "reasons", "E_MPa", "E_sd_MPa", "chi2_reduced",
         "not_identifiable", "model", "steps", "degenerate_directions",
     )  # fmt: skip
-    return {key: data.get(key) for key in keys} if isinstance(data, dict) else None
+    return {key: data.get(key) for key in keys}

@@ -6,7 +6,9 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...core.errors import ConfigError
 from ...core.files import write_text
+from ...core.json import read_json
 
 if TYPE_CHECKING:
     from ...rig import RigModel
@@ -105,10 +107,10 @@ def done_steps(panel: Panel) -> set[str]:
 def marks(folder: Path) -> dict[str, str]:
     """Return when which step was done."""
     try:
-        data = json.loads((folder / MARKS_FILE).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        data = read_json(folder / MARKS_FILE)
+    except ConfigError:
         return {}
-    return {str(k): str(v) for k, v in data.items()} if isinstance(data, dict) else {}
+    return {str(k): str(v) for k, v in data.items()}
 
 
 def mark(folder: Path, step: str, now_utc: str) -> None:
