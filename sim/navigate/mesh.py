@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +9,7 @@ from ...core.jit import njit
 from ...core.specimen import Specimen
 from ..fields import Support
 from ..scaling import rod_array
+from ..tube.mesh import elements_of
 from .rod import Bent, Rod, bend, station
 
 Array = NDArray[np.float64]
@@ -45,19 +44,7 @@ def mesh(
     elements : int
         How many a whole rod has, at least.
     """
-    before = 1.0 - length
-    s, rows = [0.0], []
-    for row in sections:
-        inside = min(row[0], row[0] - before)
-        before -= row[0]
-        if inside <= 1e-12:
-            continue
-        pieces = max(1, math.ceil(inside * elements - 1e-9))
-        start = s[-1]
-        s += [start + inside * (k + 1) / pieces for k in range(pieces)]
-        rows += [row] * pieces
-    table = np.array(rows)
-    nodes = np.array(s)
+    nodes, table = elements_of(sections, sections[:, 0], length, elements)
     m = np.ascontiguousarray(table[:, 2])
     pole = np.concatenate([[0.0], m[:-1] - m[1:], m[-1:]])
     beyond = np.zeros((len(nodes), 2))

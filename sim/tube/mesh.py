@@ -14,6 +14,36 @@ from .rod import Rod, Turn, blend, element_at, fill_inner, own_energy, station
 Array = NDArray[np.float64]
 
 
+def elements_of(
+    sections: Array, share: Array, length: float, elements: int
+) -> tuple[Array, Array]:
+    """Return the nodes of the last `length` of a rod, and the section of each element.
+
+    Parameters
+    ----------
+    sections : ndarray, shape (k, m)
+        Rows, root first.
+    share : ndarray, shape (k,)
+        Their lengths, over the rod's.
+    length : float
+        What is inserted, over the rod's length.
+    elements : int
+        How many a whole rod has, at least.
+    """
+    before = 1.0 - length
+    s, rows = [0.0], []
+    for row, own in zip(sections, share, strict=True):
+        inside = min(own, own - before)
+        before -= own
+        if inside <= 1e-12:
+            continue
+        pieces = max(1, math.ceil(inside * elements - 1e-9))
+        start = s[-1]
+        s += [start + inside * (k + 1) / pieces for k in range(pieces)]
+        rows += [row] * pieces
+    return np.array(s), np.array(rows)
+
+
 def mesh(table: Array, length: float, root: Array, elements: int) -> Rod:
     """Return the last `length` of a rod, in elements of about equal size.
 
@@ -28,19 +58,7 @@ def mesh(table: Array, length: float, root: Array, elements: int) -> Rod:
     elements : int
         How many a whole rod has, at least.
     """
-    before = 1.0 - length
-    s, rows = [0.0], []
-    for row in table[::-1]:
-        inside = min(row[H], row[H] - before)
-        before -= row[H]
-        if inside <= 1e-12:
-            continue
-        pieces = max(1, math.ceil(inside * elements - 1e-9))
-        start = s[-1]
-        s += [start + inside * (k + 1) / pieces for k in range(pieces)]
-        rows += [row] * pieces
-    made = np.array(rows)
-    nodes = np.array(s)
+    nodes, made = elements_of(table[::-1], table[::-1, H], length, elements)
     m = np.ascontiguousarray(made[:, AXIAL])
     beyond = np.zeros((len(nodes), 3))
     weights = made[:, WX : WZ + 1] * np.diff(nodes)[:, None]
