@@ -123,10 +123,15 @@ def sockets_of(name: BenchName) -> list[Path]:
     """
     folders = [control_folder(), *_folders_of_others()]
     patterns = (name.file, f"*-{name.port}{ENDING}", f"{name.rig}-*{ENDING}")
-    found = (
-        path for at in folders for one in patterns for path in sorted(at.glob(one))
-    )
+    found = (path for at in folders for one in patterns for path in _in(at, one))
     return list(dict.fromkeys(found))
+
+
+def _in(folder: Path, pattern: str) -> list[Path]:
+    try:
+        return sorted(folder.glob(pattern))
+    except FileNotFoundError:  # swept away meanwhile: nobody listens there
+        return []
 
 
 def _folders_of_others() -> Iterator[Path]:

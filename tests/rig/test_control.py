@@ -44,6 +44,19 @@ def test_nobody_holds_a_bench_that_nobody_holds(rig):
     assert list(control_folder().glob("*.sock")) == []
 
 
+def test_a_control_folder_swept_away_while_one_looks_holds_nobody(rig, monkeypatch):
+    folder, glob = control_folder(), Path.glob
+
+    def swept(self, pattern):
+        if self == folder:
+            raise FileNotFoundError(2, "No such file or directory", str(self))
+        return glob(self, pattern)
+
+    monkeypatch.setattr(Path, "glob", swept)
+    with pytest.raises(NobodyError, match="no magbend command"):
+        ask(rig, "status", port=PORT)
+
+
 def test_the_owner_tells_what_it_does_under_either_half_of_its_name(rig, tmp_path):
     state = BenchState()
     link = tmp_path / "link.toml"
