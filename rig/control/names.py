@@ -80,24 +80,31 @@ def control_folder() -> Path:
         If something stands there that is not this user's alone: a link, another
         user's folder, a folder that is open to others.
     """
-    if os.name != "posix":
-        folder = Path(tempfile.gettempdir()) / "magbend-control"
-        folder.mkdir(exist_ok=True)
-        return folder
-    folder = _SYSTEM_TEMP / f"magbend-{os.geteuid()}"
+    folder = _place()
     try:
         folder.mkdir(mode=0o700)
     except FileExistsError:
         pass
     except OSError as error:
         raise RigError(f"{folder}: cannot be made: {error.strerror}") from None
-    why = _why_not_ours(folder, os.geteuid())
+    _check_ours(folder)
+    return folder
+
+
+def _place() -> Path:
+    """Return where this user's folder of control sockets stands, made or not."""
+    if os.name != "posix":
+        return Path(tempfile.gettempdir()) / "magbend-control"
+    return _SYSTEM_TEMP / f"magbend-{os.geteuid()}"
+
+
+def _check_ours(folder: Path) -> None:
+    why = _why_not_ours(folder, os.geteuid()) if os.name == "posix" else ""
     if why:
         raise RigError(
             f"{folder}: {why}, so the bench's control socket may not stand in it; "
             f"remove it, or ask its owner to"
         )
-    return folder
 
 
 def _why_not_ours(folder: Path, user: int) -> str:
@@ -119,9 +126,17 @@ def sockets_of(name: BenchName) -> list[Path]:
     """Return the sockets under which a bench may be reached, the likeliest first.
 
     First that of both halves, then of the port, then of the rig file. The
-    administrator also reaches the benches of other users.
+    administrator also reaches the benches of other users. Looking makes no folder.
+
+    Raises
+    ------
+    RigError
+        If this user's folder is not theirs alone.
     """
-    folders = [control_folder(), *_folders_of_others()]
+    ours = _place()
+    if os.path.lexists(ours):
+        _check_ours(ours)
+    folders = [ours, *_folders_of_others()]
     patterns = (name.file, f"*-{name.port}{ENDING}", f"{name.rig}-*{ENDING}")
     found = (path for at in folders for one in patterns for path in _in(at, one))
     return list(dict.fromkeys(found))

@@ -44,6 +44,11 @@ def test_nobody_holds_a_bench_that_nobody_holds(rig):
     assert list(control_folder().glob("*.sock")) == []
 
 
+def test_looking_for_a_bench_makes_no_control_folder(rig, system_temp):
+    assert sockets_of(bench_name(rig, PORT)) == []
+    assert list(system_temp.iterdir()) == []
+
+
 def test_a_control_folder_swept_away_while_one_looks_holds_nobody(rig, monkeypatch):
     folder, glob = control_folder(), Path.glob
 
