@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -173,6 +174,22 @@ def test_a_table_without_deviations_is_refused(
     )
     with pytest.raises(ConfigError, match="E_sd_MPa"):
         bench.predict(path, draws=2)
+
+
+def test_the_table_that_the_page_shows_gives_what_it_shows(
+    bench: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = BENCHMARKS.parent / "docs" / "explanations" / "published.md"
+    shown, printed = re.findall(r"```text\n(.*?)```", page.read_text("utf-8"), re.S)
+    mine = tmp_path / "mine.csv"
+    mine.write_text(shown, encoding="utf-8")
+    bench.print_rows(bench.predict(mine))
+    told, expected = capsys.readouterr().out.split(), printed.split()
+    numbers = re.compile(r"[-+]?\d+\.\d+")
+    assert [numbers.sub("", w) for w in told] == [numbers.sub("", w) for w in expected]
+    assert [float(w) for w in told if numbers.fullmatch(w)] == pytest.approx(
+        [float(w) for w in expected if numbers.fullmatch(w)], abs=2e-3
+    )
 
 
 def test_every_published_row_has_a_band(bench: ModuleType, tmp_path: Path) -> None:
