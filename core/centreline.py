@@ -75,9 +75,12 @@ class Centreline:
     ) -> Centreline:
         """Make one of arrays known to be right, without the checks (for solvers)."""
         line = object.__new__(cls)
-        columns = (s_mm, x_mm, y_mm, theta_rad, kappa_per_mm)
-        for name, values in zip(COLUMNS, columns, strict=True):
-            object.__setattr__(line, name, values)
+        put = object.__setattr__
+        put(line, "s_mm", s_mm)
+        put(line, "x_mm", x_mm)
+        put(line, "y_mm", y_mm)
+        put(line, "theta_rad", theta_rad)
+        put(line, "kappa_per_mm", kappa_per_mm)
         return line
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeVar
 
 from .checks import finite, listed, positive, shown, size, store, within
@@ -167,6 +167,10 @@ class Specimen:
     density_sd_kg_m3: float | None = None
     natural_curvature_sd_per_mm: float | None = None
     recipe: tuple[tuple[str, float | str], ...] = ()
+    cross_sections: tuple[CrossSection, ...] = field(
+        init=False, repr=False, compare=False
+    )
+    """Cross-section of each section."""
 
     def __post_init__(self) -> None:
         store(
@@ -197,7 +201,7 @@ class Specimen:
         store(self, side_mm=found.width_mm)
         for name in SIZES[self.shape]:
             store(self, **{name: float(getattr(self, name))})
-        self._cross_sections()
+        store(self, cross_sections=self._cross_sections())
 
     def _cross_sections(self) -> tuple[CrossSection, ...]:
         own = {name: getattr(self, name) for name in SIZES[self.shape]}
@@ -225,14 +229,9 @@ class Specimen:
         return tuple(joints)
 
     @property
-    def cross_sections(self) -> tuple[CrossSection, ...]:
-        """Cross-section of each section."""
-        return self._cross_sections()
-
-    @property
     def sides_mm(self) -> tuple[float, ...]:
         """Extent of each section within the xy plane, in mm: a square's side."""
-        return tuple(section.width_mm for section in self._cross_sections())
+        return tuple(section.width_mm for section in self.cross_sections)
 
     @property
     def remanences_mT(self) -> tuple[float, ...]:

@@ -34,6 +34,8 @@ from .solution import Solution
 Array = NDArray[np.float64]
 STATUS = (STABLE, UNSTABLE, PULLED_IN)
 NO_SUPPORT = Support()
+POINTS = 61
+"""Points of a shape, by default."""
 Tips = tuple[tuple[float, float], ...]
 STRAIGHT = 1e-9
 """Curvature, times the length, of a rod that counts as straight."""
@@ -47,7 +49,7 @@ def solve(
     support: Support = NO_SUPPORT,
     model: str = "rod",
     poisson_ratio: float | None = None,
-    points: int = 61,
+    points: int = POINTS,
 ) -> Solution:
     """Return the equilibrium that the rod reaches when its load grows from zero.
 
@@ -102,13 +104,31 @@ def solve(
         return solve_solid(
             specimen, field, support=support, poisson_ratio=poisson_ratio, points=points
         )
-    in_plane = support.in_plane and field.in_plane
-    if not (in_plane and specimen.is_plain):
+    if not bends_in_plane(specimen, field, support):
         from .spatial.solver import solve_spatial
 
         spatial = solve_spatial(specimen, field, support=support, points=points)
         return spatial.seen_from_above()
-    rod, length_mm, margin, unit_Nm = _held(specimen, support)
+    return solve_in_plane(specimen, field, support, points)[0]
+
+
+def bends_in_plane(specimen: Specimen, field: Field, support: Support) -> bool:
+    """Tell whether nothing makes a rod leave the plane."""
+    return support.in_plane and field.in_plane and specimen.is_plain
+
+
+def solve_in_plane(
+    specimen: Specimen, field: Field, support: Support, points: int
+) -> tuple[Solution, Array]:
+    """Solve a rod that stays in the plane (arguments of `solve`, checked).
+
+    Returns
+    -------
+    Solution
+    ndarray, shape (4,)
+        The unknowns of the march (`planar.solver.solve_planar`).
+    """
+    rod, length_mm, margin, unit_Nm, units = _held(specimen, support)
     s = stations(points)
     flux = field_array(field, length_mm)
     case = rod, flux, rad_from_deg(support.clamp_angle_deg), margin
@@ -120,15 +140,13 @@ def solve(
     centreline = stable_in_space = None
     buckled: Tips = ()
     if outcome != GONE:
-        x, y, theta, kappa = table
-        centreline = Centreline._trusted(
-            s * length_mm, x * length_mm, y * length_mm, theta, kappa / length_mm
-        )
-        refuse_outside(field, x, y, length_mm)
-        if index > 0 and np.all(np.abs(kappa) < STRAIGHT):
+        x_mm, y_mm, theta, kappa_per_mm = table * units
+        centreline = Centreline._trusted(s * length_mm, x_mm, y_mm, theta, kappa_per_mm)
+        refuse_outside(field, x_mm, y_mm, 1.0)
+        if index > 0 and np.all(np.abs(table[3]) < STRAIGHT):
             buckled = buckled_tips(case, length_mm)
         stable_in_space = index == 0 and _holds(specimen, support, rod, flux, tip)
-    return Solution(
+    solution = Solution(
         centreline=centreline,
         status=STATUS[outcome],
         morse_index=index if centreline else -1,
@@ -140,6 +158,7 @@ def solve(
         ending=ending(case, load, length_mm) if outcome == GONE else None,
         buckled_tips_mm=buckled,
     )
+    return solution, tip
 
 
 def _holds(
@@ -157,13 +176,17 @@ def _holds(
 
 
 @lru_cache(maxsize=256)
-def _held(specimen: Specimen, support: Support) -> tuple[Array, float, float, float]:
+def _held(
+    specimen: Specimen, support: Support
+) -> tuple[Array, float, float, float, Array]:
     """Return a held rod as the kernel takes it, and what turns its numbers into units.
 
-    The array, the length in mm, half the largest side over the length, and the unit of
-    moments in N m.
+    The array, the length in mm, half the largest side over the length, and the units of
+    moments in N m and of the shape, shape (4, 1).
     """
     rod = rod_array(specimen, support)
     length_mm = specimen.length_mm
     margin = 0.5 * max(specimen.sides_mm) / length_mm
-    return rod, length_mm, margin, stiffness_Nmm2(specimen)[0] / length_mm * 1e-3
+    unit_Nm = stiffness_Nmm2(specimen)[0] / length_mm * 1e-3
+    units = np.array([[length_mm], [length_mm], [1.0], [1.0 / length_mm]])
+    return rod, length_mm, margin, unit_Nm, units

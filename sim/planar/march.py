@@ -125,20 +125,18 @@ def _moved(a, cf, sf, X, D):  # type: ignore[no-untyped-def]
 
 
 @njit(**PART)
-def _close(u, X, D):  # type: ignore[no-untyped-def]
+def _close(cf, sf, X, D):  # type: ignore[no-untyped-def]
     """Turn the columns of x_L and y_L into those of the fixed frame."""
-    cf, sf = math.cos(u[3]), math.sin(u[3])
     for a in range(1, 3):
         D[2, a], D[3, a] = _moved(a, cf, sf, X, D)
         D[0, a] += D[SWING, a]
 
 
 @njit(**PART)
-def _determinant(u, X, D, columns):  # type: ignore[no-untyped-def]
+def _determinant(cf, sf, X, D, columns):  # type: ignore[no-untyped-def]
     """Return the Jacobi determinant (`jacobi`) within the march."""
     if columns == 1:
         return D[0, 0]
-    cf, sf = math.cos(u[3]), math.sin(u[3])
     x1, y1 = _moved(1, cf, sf, X, D)
     x2, y2 = _moved(2, cf, sf, X, D)
     return (
@@ -253,10 +251,13 @@ def march(rod, field, load, u, order, step, columns, limit, s, count, X, D, T, C
     begin(u, columns, X, D)
     zeros = 0
     positive = True
+    cf = sf = 0.0
     k = count - 1
     reached = 0.0
     for i in range(rod.shape[0]):
         add_load(rod, field, i, load, u, columns, X, D)
+        if i == 0:
+            cf, sf = math.cos(u[3]), math.sin(u[3])
         enter_section(rod, i, load, u, columns, X, D)
         n = substeps(rod[i, H], X, step)
         h = rod[i, H] / n
@@ -269,7 +270,8 @@ def march(rod, field, load, u, order, step, columns, limit, s, count, X, D, T, C
             advance(h, order, X, T)
             if columns > 1:
                 spare(X, D)
-            if columns > 0 and (_determinant(u, X, D, columns) > 0.0) != positive:
+            stable = columns == 0 or _determinant(cf, sf, X, D, columns) > 0.0
+            if columns > 0 and stable != positive:
                 positive = not positive
                 zeros += 1
             if not abs(X[0]) < limit:
@@ -278,7 +280,7 @@ def march(rod, field, load, u, order, step, columns, limit, s, count, X, D, T, C
             k = sample(s, k, reached, h, last, order, x0, y0, u[3], X, T, out)
             reached += h
     if columns > 1:
-        _close(u, X, D)
+        _close(cf, sf, X, D)
     return zeros
 
 

@@ -18,10 +18,9 @@ from ...core.arrays import real_array
 from ...core.checks import listed, shown
 from ...core.errors import InputError, SolverError
 from ...core.specimen import Specimen
-from ...core.units import rad_from_deg
 from ..fields import Field, Support, as_field, check_case
-from ..one_rod import NO_SUPPORT, solve
-from ..planar.solver import ORDER, STEP, solve_planar
+from ..one_rod import NO_SUPPORT, POINTS, bends_in_plane, solve, solve_in_plane
+from ..planar.solver import ORDER, STEP
 from ..scaling import field_array, rod_array, stations
 from ..solution import Solution
 from .march import parameter_columns
@@ -105,25 +104,27 @@ def sensitivities(
     field = as_field(field)
     check_case(specimen, field, support)
     names = _names(parameters)
-    solution = solve(specimen, field, support=support)
+    in_plane = bends_in_plane(specimen, field, support)
+    if in_plane:
+        solution, u = solve_in_plane(specimen, field, support, POINTS)
+    else:
+        solution = solve(specimen, field, support=support)
     if solution.centreline is None:
         raise SolverError(
             f"{specimen.name!r} has no equilibrium at this load, so its shape has no "
             f"derivatives; the branch ends at {solution.load_limit:.4g} of the load"
         )
     s = _stations(s_mm, specimen.length_mm)
-    if not (support.in_plane and field.in_plane and specimen.is_plain):
+    if not in_plane:
         return _in_space(solution, (specimen, field, support), names, s)
-    rod = rod_array(specimen, support)
-    array = field_array(field, specimen.length_mm)
-    clamp = rad_from_deg(support.clamp_angle_deg)
-    u = solve_planar(rod, array, clamp, 0.0, stations(2), ORDER, STEP)[-1]
     if math.isnan(u[0]):
         raise SolverError(
             f"the tip of {specimen.name!r} does not fix its root at this load, which "
             "its derivatives ask for; try a smaller flux_mT or remanence_mT"
         )
-    of_names = [change_of(name, specimen, field, support) for name in names]
+    rod = rod_array(specimen, support)
+    array = field_array(field, specimen.length_mm)
+    of_names = [change_of(name, rod, specimen, field, support) for name in names]
     good, out = _derivatives(rod, array, u, of_names, s / specimen.length_mm)
     if not good or not np.all(np.isfinite(out)):
         raise SolverError(
@@ -186,7 +187,7 @@ def _names(parameters: Sequence[str]) -> tuple[str, ...]:
 
 def _stations(s_mm: ArrayLike | None, length_mm: float) -> Array:
     if s_mm is None:
-        return stations(61) * length_mm
+        return stations(POINTS) * length_mm
     s = real_array(s_mm, "s_mm", "mm")
     if (
         s.ndim != 1

@@ -25,7 +25,7 @@ from ...core.specimen import Specimen
 from ...core.units import cos_deg, rad_from_deg
 from ..fields import Field, Support
 from ..planar.march import WX, WY, E, H, M
-from ..scaling import checked_density, loads_per_unit, rod_array
+from ..scaling import checked_density, loads_per_unit
 
 Array = NDArray[np.float64]
 
@@ -43,8 +43,10 @@ class Change:
     clamp: float = 0.0
 
 
-def change_of(name: str, specimen: Specimen, field: Field, support: Support) -> Change:
-    """Return the change of the kernels' input per unit of a parameter.
+def change_of(
+    name: str, rod: Array, specimen: Specimen, field: Field, support: Support
+) -> Change:
+    """Return the change of the kernels' input, `rod` of it, per unit of a parameter.
 
     Raises
     ------
@@ -52,7 +54,7 @@ def change_of(name: str, specimen: Specimen, field: Field, support: Support) -> 
         If the parameter is unknown or has no meaning for this case.
     """
     change = Change(
-        rod=np.zeros((len(specimen.sections), 5)),
+        rod=np.zeros(rod.shape),
         field=np.zeros((len(field.sources), 6)),
     )
     match = re.fullmatch(r"([\w.]+?)(?:\[(\d+)\])?", name)
@@ -68,9 +70,9 @@ def change_of(name: str, specimen: Specimen, field: Field, support: Support) -> 
             )
         for i in chosen:
             if key in sizes:
-                _of_size(change, i, specimen, support, key)
+                _of_size(change, i, rod, specimen, key)
             else:
-                _OF_SECTIONS[key](change, i, specimen, field, support)
+                _OF_SECTIONS[key](change, i, rod, specimen, field, support)
     elif key == "clamp_angle_deg" and index is None:
         change.clamp = rad_from_deg(1.0)
     elif key in ("load_factor", "density_kg_m3", "gravity_m_s2"):
@@ -81,31 +83,42 @@ def change_of(name: str, specimen: Specimen, field: Field, support: Support) -> 
 
 
 def _of_E(
-    change: Change, i: int, specimen: Specimen, field: Field, support: Support
+    change: Change,
+    i: int,
+    rod: Array,
+    specimen: Specimen,
+    field: Field,
+    support: Support,
 ) -> None:
-    rod = rod_array(specimen, support)
     change.rod[-1 - i, E] -= rod[-1 - i, E] / specimen.sections[i].E_MPa
 
 
-def _of_size(
-    change: Change, i: int, specimen: Specimen, support: Support, name: str
-) -> None:
-    row = rod_array(specimen, support)[-1 - i]
+def _of_size(change: Change, i: int, rod: Array, specimen: Specimen, name: str) -> None:
     across = specimen.cross_sections[i]
     area, second = across.change(name)
     a, b = area / across.area_mm2, second / across.in_plane_mm4
-    change.rod[-1 - i] += np.array([0.0, -b, a, a, a]) * row
+    change.rod[-1 - i] += (0.0, -b, a, a, a) * rod[-1 - i]
 
 
 def _of_remanence(
-    change: Change, i: int, specimen: Specimen, field: Field, support: Support
+    change: Change,
+    i: int,
+    rod: Array,
+    specimen: Specimen,
+    field: Field,
+    support: Support,
 ) -> None:
     per_mT, _ = loads_per_unit(specimen)
     change.rod[-1 - i, M] += support.load_factor * per_mT[-1 - i]
 
 
 def _of_length(
-    change: Change, i: int, specimen: Specimen, field: Field, support: Support
+    change: Change,
+    i: int,
+    rod: Array,
+    specimen: Specimen,
+    field: Field,
+    support: Support,
 ) -> None:
     change.rod[-1 - i, H] += 1.0 / specimen.length_mm
     for which, source in enumerate(field.sources):
@@ -114,7 +127,7 @@ def _of_length(
 
 
 _OF_ALL = (*ALL_SIZES, "remanence_mT")
-_OF_SECTIONS: dict[str, Callable[[Change, int, Specimen, Field, Support], None]] = {
+_OF_SECTIONS: dict[str, Callable[..., None]] = {
     "E_MPa": _of_E,
     "remanence_mT": _of_remanence,
     "length_mm": _of_length,

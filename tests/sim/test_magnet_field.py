@@ -163,6 +163,21 @@ def test_the_plane_formula_is_the_general_one() -> None:
         assert np.abs(plane[2:] - out[[3, 4, 7]]).max() < 1e-11 * slope
 
 
+@pytest.mark.parametrize("across", [0.0, 10.0, 27.5, 27.6, 80.0])
+@pytest.mark.parametrize("along", [0.0, 27.5, 27.5001, 40.0, -27.5, -27.5001])
+def test_the_plane_formula_loses_no_turn_close_to_faces(
+    across: float, along: float
+) -> None:
+    block = magnet_block(Magnet.cube(55.0, 1.305), length_mm=0.0, gap_mm=0.0)
+    x, y = across, along - 27.5
+    if inside(block, x, y, 0.0, 1e-6):
+        return
+    out = np.empty(12)
+    cuboid_flux(block, x, y, 0.0, out)
+    plane = plane_flux(block, x, y)
+    assert np.abs(plane[:2] - out[:2]).max() < 1e-12
+
+
 def test_default_bench_points_along_y_at_the_tip() -> None:
     cube = Magnet.cube(55.0, 1.305)
     flux = magnet_flux_mT(cube, (30.0, 0.0, 0.0), length_mm=30.0, gap_mm=60.0)

@@ -22,6 +22,7 @@ from magbend.sim import (
     gmc,
     sensitivities,
 )
+from magbend.sim.planar import solver
 from magbend.sim.planar.solver import solve_planar
 from magbend.sim.scaling import field_array, rod_array
 
@@ -195,3 +196,16 @@ def test_no_shape_no_derivative() -> None:
     field = MagnetField(magnet=Magnet.cube(55.0, 1.305), gap_mm=20.0)
     with pytest.raises(SolverError, match="no equilibrium"):
         sensitivities(rod, field, parameters=["E_MPa[0]"])
+
+
+def test_the_case_is_solved_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half of the cost of a few derivatives would be a second solve."""
+    kept, solved = solver.solve_rows, []
+
+    def counted(*case: object) -> object:
+        solved.append(case)
+        return kept(*case)
+
+    monkeypatch.setattr(solver, "solve_rows", counted)
+    sensitivities(ROD, MAGNET, parameters=["gap_mm"])
+    assert len(solved) == 1
