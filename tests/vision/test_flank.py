@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from magbend.vision.edge.flank import fit_flanks, is_held, median_profile
+from magbend.vision.edge.flank import fit_flanks, is_held, median_profiles
 
 X = np.arange(-6.0, 5.0, 0.5) + 0.25
 PLACES = np.linspace(0.1, 0.8, 8)
@@ -57,7 +57,8 @@ def test_paper_that_was_made_white_is_not_cut_off():
     assert not is_held(np.array([0.2, 0.99, 1.02]))
 
 
-def test_profiles_that_leave_the_picture_do_not_count():
-    rows = np.array([[1.0, 2.0], [np.nan, 5.0], [3.0, 4.0]])
-    assert median_profile(rows).tolist() == [2.0, 3.0]
-    assert np.isnan(median_profile(rows[1:2])).all()
+def test_samples_that_lie_outside_the_picture_do_not_count():
+    rows = np.array([[1.0, 2.0], [np.nan, 5.0], [3.0, 4.0], [np.nan, np.nan]])
+    medians = median_profiles(rows, np.array([0, 3, 4]))
+    assert medians[0].tolist() == [2.0, 4.0]
+    assert np.isnan(medians[1]).all()

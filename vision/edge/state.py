@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..curve.curve import Curve
 from .edges import Edges
+from .flank import Flanks
 
 Array = NDArray[np.float64]
 Root = Literal["clamp", "border", "free"]
@@ -49,6 +50,7 @@ class State:
     blur: float = 1.0
     scatter: float = 0.0
     fuzz: float = 0.0
+    flanks: Flanks | None = None
 
 
 @dataclass(frozen=True, slots=True)

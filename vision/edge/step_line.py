@@ -16,7 +16,7 @@ from ...core.jit import njit
 from ..curve.curve import Curve
 from ..curve.robust import median
 from .edges import _bilinear
-from .flank import WHITE, fit_flanks, is_held, median_profile
+from .flank import WHITE, fit_flanks, is_held, median_profiles
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -150,7 +150,7 @@ def _to_whole_step(
     profiles = [
         np.interp(place + x, s, lane) for place, lane in zip(at, light, strict=True)
     ]
-    profile = median_profile(np.array(profiles))
+    (profile,) = median_profiles(np.array(profiles), np.array([0, len(profiles)]))
     if not median(profile[x > 0.6 * outer]) > WHITE:
         return line
     step = fit_flanks(x, profile[None], blur=blur, known=True)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .edges import STEP_PX, _sample
-from .flank import WHITE, fit_flanks, is_held, median_profile
+from .flank import WHITE, fit_flanks, median_profiles
 from .state import Seen, State
 from .wall_light import MIRRORED, SKY, Walls, reflectance
 
@@ -27,9 +27,9 @@ def saturated(seen: Seen) -> float:
     return float(np.mean(paper > WHITE))
 
 
-def are_cut_off(grey: Image, seen: Seen) -> bool:
-    """Whether edges of a dark rod are cut off by what the sensor holds."""
-    return saturated(seen) > _SOME and is_held(grey)
+def are_cut_off(seen: Seen) -> bool:
+    """Whether edges of a dark rod are cut off where a sensor holds no more light."""
+    return saturated(seen) > _SOME
 
 
 def to_whole_edges(grey: Image, state: State, seen: Seen, walls: Walls | None) -> Seen:
@@ -38,26 +38,29 @@ def to_whole_edges(grey: Image, state: State, seen: Seen, walls: Walls | None) -
     And know the blur, which an edge that is cut off seems to have too little of. The
     edges of other rods stay as they are.
     """
-    if not are_cut_off(grey, seen):
+    if not are_cut_off(seen):
         return seen
-    pieces = np.array_split(np.arange(len(seen.s)), _PIECES)
-    x, light = _sides(grey, state, seen, pieces)
+    bounds = np.linspace(0, len(seen.s), _PIECES + 1).astype(np.int64)
+    x, light = _sides(grey, state, seen, bounds)
     wall = np.zeros(len(seen.s))
     if walls is not None:
         wall, _ = walls(*state.curve.at(seen.s), state.width)
-    mean = np.array([wall[piece].mean() for piece in pieces])
+    mean = _means(wall, bounds)
     wide = np.maximum(np.concatenate([mean, -mean]), 0.0)
     share = MIRRORED * reflectance(wide / np.maximum(state.width - wide, 1.0))
-    flanks = fit_flanks(x, light, blur=state.blur, wall=wide, mirrored=share, sky=SKY)
-    state.blur = flanks.blur
-    middles = np.array([seen.s[piece].mean() for piece in pieces])
+    flanks = fit_flanks(
+        x, light, blur=state.blur, wall=wide, mirrored=share, sky=SKY,
+        near=state.flanks,
+    )  # fmt: skip
+    state.flanks, state.blur = flanks, flanks.blur
+    middles = _means(seen.s, bounds)
     low, high = (np.interp(seen.s, middles, by) for by in flanks.moves(2))
     moved = replace(seen.edges, low=seen.edges.low - low, high=seen.edges.high + high)
     return replace(seen, edges=moved)
 
 
 def _sides(
-    grey: Image, state: State, seen: Seen, pieces: list[NDArray[np.intp]]
+    grey: Image, state: State, seen: Seen, bounds: NDArray[np.int64]
 ) -> tuple[Array, Array]:
     """Return places of samples, px outwards, and the profiles of pieces of both sides.
 
@@ -75,6 +78,11 @@ def _sides(
     for outwards, edge in ((-1.0, edges.low), (1.0, edges.high)):
         _sample(grey, points, normals, edge, outwards, before, np.float32(1.0), strip)
         strip[~seen.good] = np.nan
-        out += [median_profile(strip[piece]) for piece in pieces]
+        out.append(median_profiles(strip, bounds))
     x = np.asarray((np.arange(strip.shape[1]) - before + 0.5) * STEP_PX, np.float64)
-    return x, np.array(out)
+    return x, np.concatenate(out)
+
+
+def _means(values: Array, bounds: NDArray[np.int64]) -> Array:
+    """Return the means of the pieces between bounds."""
+    return np.asarray(np.add.reduceat(values, bounds[:-1]) / np.diff(bounds))

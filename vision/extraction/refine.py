@@ -19,6 +19,7 @@ from ..curve.spline import Smooth
 from ..edge.clamp import ClampLines
 from ..edge.edges import Edges, find_edges
 from ..edge.ends import find_ends
+from ..edge.flank import is_held
 from ..edge.state import LostError, Root, Seen, State
 from ..edge.step_line import EndFace
 from ..edge.wall_light import Walls, to_wall_ends
@@ -151,12 +152,13 @@ def refine(
         tip, lines, first = find_ends(grey, state, seen, root, sign, 0, walls)
         end, still_px = tip.s, _STILL_PX
     places, aside, settled = None, np.inf, False
+    held = sign > 0.0 and is_held(grey)
     for turn in range(_PASSES):
         if turn:
             seen = _look(grey, state, sign, turn, seeking=seeking)
         if walls is not None:
             seen = to_wall_ends(state, seen, walls)
-        if sign > 0.0 and not seeking:
+        if held and not seeking:
             seen = to_whole_edges(grey, state, seen, walls)
         known = None if places is None or aside > _JOINTS_STILL_PX else places - first
         fit, used, aside, places = _fit(
@@ -185,7 +187,7 @@ def refine(
         clamp=None if lines is None else lines.shifted(first), rough=state.rough,
         blur=state.blur,
         saturated=saturated(seen) if sign > 0.0 else 0.0,
-        whole=sign > 0.0 and are_cut_off(grey, seen), settled=settled,
+        whole=held and are_cut_off(seen), settled=settled,
     )  # fmt: skip
 
 
