@@ -47,10 +47,23 @@ def plain():
 def test_white_paper_hides_how_much_light_there_was(plain, exposure):
     """Half level of what is left would make the rod 0.02 to 0.04 mm too thin."""
     white = measured(replace(SCENE, light=SceneLight(exposure=exposure)))
-    assert "overexposed" in white.flags
+    assert "clipped" in white.flags
+    assert "overexposed" not in white.flags
     assert abs(white.width_mm - SIDE) < 0.016
     assert abs(white.width_mm - SIDE) < 2.0 * white.width_sd_mm
     assert white.width_sd_mm > 1.5 * plain.width_sd_mm
+    assert abs(white.length_mm - LENGTH) < 3.0 * white.length_sd_mm
+
+
+@pytest.mark.parametrize("exposure", [2.3, 3.0])
+def test_a_rod_that_is_white_itself_is_no_wider_for_it(exposure):
+    """Half level of what is left would make the rod 0.06 to 0.10 mm too wide and long."""
+    board = replace(SCENE, paper=(0.04, 0.04, 0.045), rod_colour=(0.55, 0.58, 0.60))
+    white = measured(replace(board, light=SceneLight(exposure=exposure)))
+    assert white.inverted
+    assert "clipped" in white.flags
+    assert abs(white.width_mm - SIDE) < 0.036
+    assert abs(white.width_mm - SIDE) < 2.0 * white.width_sd_mm
     assert abs(white.length_mm - LENGTH) < 3.0 * white.length_sd_mm
 
 

@@ -80,9 +80,7 @@ def is_held(light: NDArray[np.floating]) -> bool:
 
 
 @njit(cache=True)
-def median_profiles(
-    profiles: NDArray[np.floating], bounds: NDArray[np.int64]
-) -> Array:
+def median_profiles(profiles: NDArray[np.floating], bounds: NDArray[np.int64]) -> Array:
     """Return the medians, (k, m), of k pieces of profiles, (n, m), NaN left out.
 
     `bounds` are the first rows of the pieces, and the end of the last.

@@ -142,8 +142,12 @@ def _to_whole_step(
     light: Array, s: Array, across: Array, line: EndFace, blur: float, inner: float,
     outer: float,
 ) -> EndFace:  # fmt: skip
-    """Return a line beside what is white moved to where it is with all its light."""
-    if not is_held(light):
+    """Return a line beside what is white moved to where it is with all its light.
+
+    Lanes of a light rod are negative: white lies before the line then.
+    """
+    sign = 1.0 if is_held(light) else -1.0
+    if not is_held(sign * light):
         return line
     x = np.arange(-inner, outer, STEP_PX)
     at = line.s + line.skew * across
@@ -151,10 +155,12 @@ def _to_whole_step(
         np.interp(place + x, s, lane) for place, lane in zip(at, light, strict=True)
     ]
     (profile,) = median_profiles(np.array(profiles), np.array([0, len(profiles)]))
-    if not median(profile[x > 0.6 * outer]) > WHITE:
+    if sign < 0.0:
+        x, profile = -x[::-1], -profile[::-1]
+    if not median(profile[x > 0.6 * x[-1]]) > WHITE:
         return line
     step = fit_flanks(x, profile[None], blur=blur, known=True)
-    return replace(line, s=line.s + float(step.moves()[0, 0]))
+    return replace(line, s=line.s + sign * float(step.moves()[0, 0]))
 
 
 @njit(cache=True)

@@ -1,4 +1,8 @@
-"""Side edges of a rod on paper that is over-exposed: its light is fitted, not seen."""
+"""Side edges of a rod beside white paper, or white itself: light is fitted, not seen.
+
+A white rod on a dark board is a dark rod's edge seen from outside: its half level lies
+outside it.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .edges import STEP_PX, _sample
-from .flank import WHITE, fit_flanks, median_profiles
+from .flank import WHITE, Flanks, fit_flanks, median_profiles
 from .state import Seen, State
 from .wall_light import MIRRORED, SKY, Walls, reflectance
 
@@ -17,46 +21,59 @@ Image = NDArray[np.float32]
 
 _PIECES = 20
 """A rod's sides are fitted in so many pieces: shade beside it may change the light."""
-_SOME = 0.02
-"""Part of a rod beside which paper must be white."""
+SOME = 0.02
+"""Part of a rod whose edges must be cut off for them to be moved."""
 
 
-def saturated(seen: Seen) -> float:
-    """Return the part of the rod beside which the paper is as light as can be."""
-    paper = np.maximum(seen.edges.outer_low, seen.edges.outer_high)[seen.good]
-    return float(np.mean(paper > WHITE))
+def saturated(seen: Seen, sign: float) -> float:
+    """Return the part of the rod whose light side is as light as can be.
+
+    That is the paper, or with `sign` -1 the rod itself.
+    """
+    edges = seen.edges
+    light = np.maximum(edges.outer_low, edges.outer_high) if sign > 0 else -edges.inner
+    return float(np.mean(light[seen.good] > WHITE))
 
 
-def are_cut_off(seen: Seen) -> bool:
-    """Whether edges of a dark rod are cut off where a sensor holds no more light."""
-    return saturated(seen) > _SOME
-
-
-def to_whole_edges(grey: Image, state: State, seen: Seen, walls: Walls | None) -> Seen:
-    """Move edges beside white paper to where they are with all its light.
+def to_whole_edges(
+    grey: Image, state: State, seen: Seen, walls: Walls | None, sign: float, *,
+    anew: bool,
+) -> Seen:  # fmt: skip
+    """Move edges that are cut off at white to where they are with all the light.
 
     And know the blur, which an edge that is cut off seems to have too little of. The
-    edges of other rods stay as they are.
+    edges of other rods stay as they are. Unless `anew`, by what was fitted before.
     """
-    if not are_cut_off(seen):
+    if not saturated(seen, sign) > SOME:
         return seen
     bounds = np.linspace(0, len(seen.s), _PIECES + 1).astype(np.int64)
+    if anew or state.flanks is None:
+        state.flanks = _flanks(grey, state, seen, bounds, walls, sign)
+    state.blur = state.flanks.blur
+    middles = _means(seen.s, bounds)
+    low, high = (np.interp(seen.s, middles, sign * by) for by in state.flanks.moves(2))
+    moved = replace(seen.edges, low=seen.edges.low - low, high=seen.edges.high + high)
+    return replace(seen, edges=moved)
+
+
+def _flanks(
+    grey: Image, state: State, seen: Seen, bounds: NDArray[np.int64],
+    walls: Walls | None, sign: float,
+) -> Flanks:  # fmt: skip
+    """Return the steps at the pieces of both sides, from their dark to their light."""
     x, light = _sides(grey, state, seen, bounds)
+    if sign < 0.0:
+        x, light = -x[::-1], light[:, ::-1]
     wall = np.zeros(len(seen.s))
     if walls is not None:
         wall, _ = walls(*state.curve.at(seen.s), state.width)
     mean = _means(wall, bounds)
     wide = np.maximum(np.concatenate([mean, -mean]), 0.0)
     share = MIRRORED * reflectance(wide / np.maximum(state.width - wide, 1.0))
-    flanks = fit_flanks(
+    return fit_flanks(
         x, light, blur=state.blur, wall=wide, mirrored=share, sky=SKY,
         near=state.flanks,
     )  # fmt: skip
-    state.flanks, state.blur = flanks, flanks.blur
-    middles = _means(seen.s, bounds)
-    low, high = (np.interp(seen.s, middles, by) for by in flanks.moves(2))
-    moved = replace(seen.edges, low=seen.edges.low - low, high=seen.edges.high + high)
-    return replace(seen, edges=moved)
 
 
 def _sides(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..curve.robust import median, quantile
 from ..edge.state import LostError
 from ..edge.step_line import lanes
+from ..edge.white import SOME
 from ..find.ground import View
 from ..find.rod import Candidate
 from ..measurement import Measurement
@@ -123,8 +124,9 @@ def doubts(
         flags.append(TIP_GOES_ON)
     if direction_is_doubtful(result.clamp_angle_sd_deg, result.length_mm):
         flags.append("direction_doubtful")
-    if photo.clipped > 0.01:
-        flags.append("overexposed")
+    if refined.whole or photo.clipped > 0.01:
+        known = refined.whole or refined.saturated <= SOME
+        flags.append("clipped" if known else "overexposed")
     if refined.blur > max(BLURRED_PX, BLURRED * result.width_px):
         flags.append("blurred")
     if quantile(refined.shaded[refined.good], 0.9) > SHADE_PX:

@@ -23,7 +23,7 @@ from ..edge.flank import is_held
 from ..edge.state import LostError, Root, Seen, State
 from ..edge.step_line import EndFace
 from ..edge.wall_light import Walls, to_wall_ends
-from ..edge.white import are_cut_off, saturated, to_whole_edges
+from ..edge.white import SOME, saturated, to_whole_edges
 from ..find.track import FLARED, Start
 
 Array = NDArray[np.float64]
@@ -40,8 +40,8 @@ _STILL_PX, _ENDS_STILL_PX = 0.02, 0.15
 the curve as it is then."""
 _NEAR_STILL_PX = 0.08
 """The first of them in a film, where time counts: what is left is a part of it."""
-_JOINTS_STILL_PX = 0.05
-"""A curve that moves by less keeps its joints."""
+_KEPT_PX = 0.05
+"""A curve that moves by less keeps its joints, and the light beside white paper."""
 _BIN_PX = 4.0
 _BINS = 200
 """Stations are averaged over bins before the fit: so far, or so many on a long rod."""
@@ -75,9 +75,10 @@ class Refined:
     blur : float
         Standard deviation of the blur, as its edges show it, px.
     saturated : float
-        Part of it beside which the paper is white, as far as the picture can tell.
+        Part of it beside which the paper is white, as far as the picture can tell; or
+        where it is white itself.
     whole : bool
-        Whether edges beside white paper were moved to half of all its light.
+        Whether edges that are cut off there were moved to half of all the light.
     settled : bool
         Whether the last pass still moved nothing.
     """
@@ -152,15 +153,15 @@ def refine(
         tip, lines, first = find_ends(grey, state, seen, root, sign, 0, walls)
         end, still_px = tip.s, _STILL_PX
     places, aside, settled = None, np.inf, False
-    held = sign > 0.0 and is_held(grey)
+    held = is_held(grey)
     for turn in range(_PASSES):
         if turn:
             seen = _look(grey, state, sign, turn, seeking=seeking)
         if walls is not None:
             seen = to_wall_ends(state, seen, walls)
         if held and not seeking:
-            seen = to_whole_edges(grey, state, seen, walls)
-        known = None if places is None or aside > _JOINTS_STILL_PX else places - first
+            seen = to_whole_edges(grey, state, seen, walls, sign, anew=aside > _KEPT_PX)
+        known = None if places is None or aside > _KEPT_PX else places - first
         fit, used, aside, places = _fit(
             state, seen, first, end, joints, known, seeking=seeking,
             clamped=root == "clamp",
@@ -181,13 +182,13 @@ def refine(
             break
         seeking = seeking and turn + 1 < _SEEKING_PASSES and aside > _NEAR_PX
     curve = replace(fit.curve, s=fit.curve.s - first)
+    white = saturated(seen, sign)
     return Refined(
         fit=replace(fit, curve=curve), shaded=shaded, good=used, width=width,
         sigma_width=sigma_width, tip=replace(tip, s=tip.s - first),
         clamp=None if lines is None else lines.shifted(first), rough=state.rough,
         blur=state.blur,
-        saturated=saturated(seen) if sign > 0.0 else 0.0,
-        whole=held and are_cut_off(seen), settled=settled,
+        saturated=white, whole=held and white > SOME, settled=settled,
     )  # fmt: skip
 
 
