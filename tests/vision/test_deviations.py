@@ -57,7 +57,7 @@ def test_white_paper_hides_how_much_light_there_was(plain, exposure):
 
 @pytest.mark.parametrize("exposure", [2.3, 3.0])
 def test_a_rod_that_is_white_itself_is_no_wider_for_it(exposure):
-    """Half level of what is left would make the rod 0.06 to 0.10 mm too wide and long."""
+    """Half level of what is left would make it 0.06 to 0.10 mm too wide and long."""
     board = replace(SCENE, paper=(0.04, 0.04, 0.045), rod_colour=(0.55, 0.58, 0.60))
     white = measured(replace(board, light=SceneLight(exposure=exposure)))
     assert white.inverted

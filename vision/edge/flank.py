@@ -198,8 +198,8 @@ def _flank(
     place, rod, paper = at
     above = mirrored * paper + (sky - 1.0) * rod if wall > 0.0 else 0.0
     change[:] = 0.0
-    for node, share in zip(_NODES, _SHARES):
-        t = (x + node - place) / blur
+    for n in range(_NODES.size):
+        share, t = _SHARES[n], (x + _NODES[n] - place) / blur
         outside, bell = _phi(t)
         edge, rim, wider = outside, bell, t + wall / blur
         if wall > 0.0:
