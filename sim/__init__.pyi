@@ -31,7 +31,7 @@ from .batch.threads import (
 from .batch.tips import (
     solve_many as solve_many,
 )
-from .check.solver import (
+from .check.verify import (
     verify as verify,
 )
 from .equilibria.find import (

@@ -4,6 +4,12 @@ from .solver import (
 from .solver import (
     check_solve as check_solve,
 )
-from .solver import (
+from .space import (
+    SpatialCheck as SpatialCheck,
+)
+from .space import (
+    check_spatial as check_spatial,
+)
+from .verify import (
     verify as verify,
 )

@@ -19,6 +19,8 @@ from ...core.specimen import Specimen
 from ...core.units import MU0
 from ..fields import Field, Support
 from ..probe import field_table
+from ..spatial.rod import SpatialRod, Vector
+from .quadrature import integrals
 
 Array = NDArray[np.float64]
 
@@ -83,7 +85,7 @@ def discretise(
     xi, w = np.polynomial.legendre.leggauss(degree + 8)
     values, slopes = lagrange(degree, xi)
     q, count = len(xi), len(mesh) - 1
-    inner = _integrals(xi)
+    inner = integrals(xi)
     angle = np.zeros((count * q, count * degree + 1))
     slope, place = np.zeros_like(angle), np.zeros((count * q, count * q))
     for e, h in enumerate(np.diff(mesh)):
@@ -106,37 +108,21 @@ def discretise(
         s=s, weight=weight, angle=angle, slope=slope, place=place,
         EI=moduli * second,
         m=support.load_factor * area * remanence / MU0,
-        load=_weight(specimen, support) * area[:, None],
+        load=weight_N_per_m3(specimen, support.gravity_m_s2)[:2] * area[:, None],
     )  # fmt: skip
 
 
-def _weight(specimen: Specimen, support: Support) -> Array:
-    gravity = np.array(support.gravity_m_s2[:2])
-    if not np.any(gravity):
-        return np.zeros(2)
-    if specimen.density_kg_m3 is None:
+def weight_N_per_m3(rod: Specimen | SpatialRod, gravity_m_s2: Vector) -> Array:
+    """Return the weight (x, y, z) of a volume; refuse it of a rod without density."""
+    if not any(gravity_m_s2):
+        return np.zeros(3)
+    if rod.density_kg_m3 is None:
         raise InputError(
-            f"specimen {specimen.name!r} must have a density_kg_m3 in kg/m3 for its "
-            "weight to be taken into account; instead received none"
+            "the rod must have a density_kg_m3 in kg/m3 for its weight to be taken "
+            "into account; instead received none"
         )
-    weight: Array = specimen.density_kg_m3 * gravity
+    weight: Array = rod.density_kg_m3 * np.array(gravity_m_s2)
     return weight
-
-
-def _integrals(xi: Array) -> Array:
-    """Integrate from -1 to each Gauss point: exact for the interpolating polynomial."""
-    n = len(xi)
-    inverse = np.linalg.inv(np.polynomial.legendre.legvander(xi, n - 1))
-    upper = np.stack(
-        [
-            np.polynomial.legendre.legval(
-                xi, np.polynomial.legendre.legint(row, lbnd=-1.0)
-            )
-            for row in np.eye(n)
-        ],
-        axis=1,
-    )
-    return upper @ inverse
 
 
 def _flux(field: Field, length_mm: float, r: Array) -> tuple[Array, Array]:

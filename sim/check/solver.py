@@ -1,4 +1,4 @@
-"""An independent check: least energy of a discretised rod under its distributed load.
+"""An independent check in the plane: least energy of a rod under distributed load.
 
 Nothing is shared with the marching solvers: no free-tip march, no pole load, no
 variational columns. The tangent angle is a polynomial on each of a number of elements,
@@ -27,64 +27,12 @@ from ...core.errors import InputError, SolverError
 from ...core.specimen import Specimen
 from ...core.units import rad_from_deg
 from ..fields import Field, Support, as_field, check_case, check_plain
-from ..solution import Solution
 from .energy import Discretisation, discretise, energy, hessian, lagrange, node_places
 
 Array = NDArray[np.float64]
 
 MOST_DEGREE = 40
 """Of the polynomials: from 20 on, rounding is all that is left."""
-
-
-def verify(
-    specimen: Specimen,
-    field: Field,
-    solution: Solution,
-    *,
-    support: Support | None = None,
-    degree: int = 12,
-) -> float:
-    """Return the largest distance between a solution and the check solver's, in mm.
-
-    Parameters
-    ----------
-    specimen, field, support
-        What `solution` is a solution of; everything within the plane.
-    solution : Solution
-        From `solve` with the plain rod model.
-    degree : int
-        Of the polynomials.
-
-    Raises
-    ------
-    InputError
-        If the case is not planar, or the solution has no shape or is of another rod.
-    SolverError
-        If the check solver finds no equilibrium near the solution.
-    """
-    if not isinstance(solution, Solution):
-        raise InputError(
-            f"solution must be a Solution; instead received {shown(solution)}"
-        )
-    if solution.centreline is None:
-        raise InputError(
-            f"a solution to verify must have a shape; instead received one with status "
-            f"{solution.status!r}"
-        )
-    shape = solution.centreline
-    check_case(specimen, field, support or Support())
-    length_mm = specimen.length_mm
-    if abs(shape.s_mm[-1] - length_mm) > 1e-9 * length_mm:
-        raise InputError(
-            f"a solution to verify must be of a rod of {length_mm:g} mm, as the "
-            f"specimen is; instead received one of {shape.s_mm[-1]:g} mm"
-        )
-    check = check_solve(
-        specimen, field, support=support, degree=degree,
-        start=(shape.s_mm, shape.theta_rad),
-    )  # fmt: skip
-    x_mm, y_mm = check.at(shape.s_mm)
-    return float(np.max(np.hypot(x_mm - shape.x_mm, y_mm - shape.y_mm)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -109,6 +109,17 @@ def test_magnet_weight_and_check(tmp_path: Path) -> None:
     assert data["check_mm"] < 1e-8
 
 
+def test_check_of_a_rod_that_leaves_the_plane() -> None:
+    case = (
+        "shape", "--gmc", "2", "--field-mT", "50", "--density-kg-m3", "2640",
+        "--gravity-m-s2", "0", "0", "-9.80665", "--verify",
+    )  # fmt: skip
+    data = json.loads(run(*case, "--json"))
+    assert data["sag_mm"] > 0.1
+    assert 0.0 < data["check_mm"] < data["error_mm"]
+    assert f"least energy agrees to {data['check_mm']:.1e} mm" in run(*case)
+
+
 def test_pulled_in_has_no_shape_to_write(tmp_path: Path) -> None:
     rod = tmp_path / "rod.toml"
     rod.write_text(
@@ -122,6 +133,7 @@ def test_pulled_in_has_no_shape_to_write(tmp_path: Path) -> None:
     case = ("shape", "--specimen", str(rod), "--magnet", str(magnet), "--gap-mm", "20")
     assert "pulled in: no equilibrium" in run(*case)
     assert ", where the tip of the straight rod is" in run(*case)
+    assert "none: there is no shape" in run(*case, "--verify")
     out = tmp_path / "shape.csv"
     with pytest.raises(SolverError, match="no shape to write"):
         run(*case, "--out", str(out))

@@ -128,7 +128,6 @@ def test_planar_solvers_refuse_what_is_not_plain() -> None:
     curved = rod("round", natural_curvature_per_mm=0.03)
     for task in (
         lambda: find_equilibria(curved, FIELDS[0]),
-        lambda: verify(curved, FIELDS[0], solve(curved, FIELDS[0])),
         lambda: solve(curved, FIELDS[0], model="solid"),
     ):
         with pytest.raises(InputError, match="natural_curvature_per_mm"):
