@@ -53,8 +53,12 @@ def draw(rng: np.random.Generator, n: int, times: float, *, cube: bool) -> dict:
     }
 
 
-def check(designs: dict, magnet: Magnet | None) -> np.ndarray:
-    """Return counts: stable, unstable, gone; bounds broken, indices, outcomes off."""
+def check(designs: dict, magnet: Magnet | None) -> tuple[np.ndarray, list[str]]:
+    """Return counts: stable, unstable, gone; bounds broken, indices, outcomes off.
+
+    And a line for each rod that is off.
+    """
+    off = []
     found = solve_spatial_many(designs, magnet=magnet, support=HELD)
     sizes = {k: v[:, None] if k == "side_mm" else v for k, v in designs.items()}
     rods, total_mm, margins = _rods(sizes, HELD, 0.49)
@@ -76,12 +80,19 @@ def check(designs: dict, magnet: Magnet | None) -> np.ndarray:
             index = -1
         if (index < 0) != (one["outcome"] == 2):
             counts[5] += 1
+            off.append(f"rod {i}: outcome {one['outcome']}, by more steps {index}")
         elif index >= 0:
             tip = np.array([one[f"tip_{axis}_mm"] for axis in "xyz"])
-            counts[3] += np.abs(r * total_mm[i] - tip).max() > one["error_mm"]
+            miss_mm = np.abs(r * total_mm[i] - tip).max()
+            counts[3] += miss_mm > one["error_mm"]
             true = morse_index(rods[i], fields[i], 1.0, n, R, r)
             counts[4] += true != one["morse_index"]
-    return counts
+            if true != one["morse_index"] or miss_mm > one["error_mm"]:
+                off.append(
+                    f"rod {i}: index {one['morse_index']}, by more steps {true}; tip "
+                    f"off by {miss_mm:.1e} mm, bound {one['error_mm']:.1e} mm"
+                )
+    return counts, off
 
 
 def main() -> None:
@@ -91,11 +102,13 @@ def main() -> None:
     print("remanence  field     stable unstable  gone | bounds  indices outcomes off")
     for times in (1.0, 5.0, 20.0):
         for cube in (False, True):
-            counts = check(draw(rng, n, times, cube=cube), CUBE if cube else None)
+            designs = draw(rng, n, times, cube=cube)
+            counts, off = check(designs, CUBE if cube else None)
             print(
                 f"{times:6.0f} x   {'cube' if cube else 'uniform':8} "
-                + "{:7d} {:8d} {:5d} | {:6d} {:8d} {:8d}".format(*counts)
-            )
+                + "{:7d} {:8d} {:5d} | {:6d} {:8d} {:8d}".format(*counts),
+                *(f"    {line}" for line in off), sep="\n", flush=True,
+            )  # fmt: skip
 
 
 if __name__ == "__main__":
