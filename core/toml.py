@@ -67,8 +67,10 @@ class FileModel(BaseModel):
         return value
 
 
-def read_toml(path: Path, model: type[Model]) -> Model:
+def read_toml(path: Path, model: type[Model], *, is_json: bool = False) -> Model:
     """Read `path` as TOML (or as JSON, if it starts with a brace) into `model`.
+
+    `is_json` says that the file is JSON, whatever it starts with.
 
     Raises
     ------
@@ -77,8 +79,9 @@ def read_toml(path: Path, model: type[Model]) -> Model:
         value that cannot be: one sentence with file, line, key and what is expected.
     """
     text = read_text(path)
-    is_list = path.suffix.lower() == ".json" and text.lstrip().startswith("[")
-    is_json = is_list or text.lstrip().startswith("{")
+    may_be_json = is_json or path.suffix.lower() == ".json"
+    is_list = may_be_json and text.lstrip().startswith("[")
+    is_json = is_json or is_list or text.lstrip().startswith("{")
     try:
         data = parse_json(text.encode()) if is_json else _parse_toml(text)
     except (ValueError, RecursionError) as error:

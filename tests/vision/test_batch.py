@@ -440,6 +440,19 @@ def test_overlay_of_a_large_photograph_is_made_smaller():
     assert shown.shape == (1000, 2400, 3)
 
 
+def test_caption_of_a_tiny_picture_is_whole(monkeypatch):
+    written = []
+    monkeypatch.setattr(cv2, "putText", lambda *at: written.append(at))
+    reason = "the measured axis is 12 px long, but the dark thing it belongs to 300 px"
+    tiny = Photo(grey=np.full((90, 120), 0.7, dtype=np.float32))
+    shown = draw_overlay(tiny, failure("inconsistent", reason))
+    assert reason in " ".join(text for _, text, *_ in written)
+    for _, text, (x, y), font, size, _, thickness, _ in written:
+        (width, _), _ = cv2.getTextSize(text, font, size, thickness)
+        assert x + width <= shown.shape[1]
+        assert y <= shown.shape[0]
+
+
 def test_overlay_draws_the_axis_where_the_rod_is(tmp_path, good):
     from magbend.vision.extraction.extract import extract
 

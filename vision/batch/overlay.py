@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 
 import cv2
 import numpy as np
@@ -29,6 +30,8 @@ MAX_SIDE_PX = 2400
 FILE_SIDE_PX = 1280
 """The same in files: writing them should not take longer than measuring."""
 
+LEAST_SIDE_PX = 480
+
 
 def draw_overlay(
     photo: Photo, measurement: Measurement, *, max_side_px: int = MAX_SIDE_PX
@@ -43,7 +46,8 @@ def draw_overlay(
         A failed one is crossed out and says why; what might have been the rod is
         drawn and numbered, the likeliest first.
     max_side_px : int
-        Larger photographs are shown at a half, a third ... of their scale.
+        Larger photographs are shown at a half, a third ... of their scale; tiny ones
+        enlarged to `LEAST_SIDE_PX`, for lines and words to have room.
 
     Returns
     -------
@@ -51,11 +55,13 @@ def draw_overlay(
         Blue, green, red. The axis is orange, the edges blue, clamp and tip green.
     """
     width, height = photo.size_px
-    scale = 1.0 / math.ceil(max(width, height) / max_side_px)
+    longer = max(width, height)
+    scale = math.ceil(LEAST_SIDE_PX / longer) / math.ceil(longer / max_side_px)
     grey = photo.grey
-    if scale < 1.0:
+    if scale != 1.0:
         size = (max(1, round(width * scale)), max(1, round(height * scale)))
-        grey = np.asarray(cv2.resize(grey, size, interpolation=cv2.INTER_AREA))
+        kind = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_NEAREST
+        grey = np.asarray(cv2.resize(grey, size, interpolation=kind))
     white = float(np.quantile(grey[::8, ::8], 0.995))
     encoded = encode_srgb(np.asarray(grey / max(white, 1e-6) * 0.9, dtype=np.float32))
     coarse = encoded & np.uint8(_GREYS)
@@ -156,10 +162,11 @@ def _caption(picture: NDArray[np.uint8], measurement: Measurement) -> None:
     size = max(0.35, picture.shape[1] / 2600)
     step = round(34 * size)
     room = max(10, int(picture.shape[1] / (19 * size)))
+    lines = [part for line in lines for part in textwrap.wrap(line, room)]
     band = picture[: step * len(lines) + step // 2]
     band[:] = (band.astype(np.uint16) + 3 * 255) // 4
     for row, line in enumerate(lines):
-        text = line.encode("ascii", "replace").decode()[:room]
+        text = line.encode("ascii", "replace").decode()
         at = (round(12 * size), step * (row + 1))
         cv2.putText(
             picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, (40, 40, 40), 1,

@@ -111,7 +111,7 @@ def read_calibration(path: Path) -> Calibration:
         If the file is missing, a key is missing, unknown or impossible, or the numbers
         do not make a camera.
     """
-    model = read_toml(path, CalibrationModel)
+    model = read_toml(path, CalibrationModel, is_json=True)
     try:
         return _calibration(model)
     except InputError as error:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..curve.curve import Curve
 from ..curve.robust import median
 from .clamp import ClampLines, between, find_clamp
+from .edges import clear_of
 from .state import LostError, Root, Seen, State
 from .step_line import EndFace
 from .tip import find_tip
@@ -21,6 +22,11 @@ Image = NDArray[np.float32]
 
 APART_PX = 2.0
 """The two lines at a clamp tell different things if they are farther apart."""
+
+_LEAST_SHADE, _SEEN_ON, _SHADED, _LAG_PX = 0.25, 0.7, 0.5, 1.5
+"""Widths of the rod by which a line is ahead of the root, and share of the stations
+there that show two edges, if it is a shade's; contrast in the shade over that on paper;
+and half of what a rise is taken over."""
 
 _FINE = 2
 """The first pass whose ends are more than places to look at next."""
@@ -56,13 +62,52 @@ def find_ends(
         return tip, None, _border_crossing(grey, curve)
     if root == "free":
         return tip, None, _other_end(grey, state, sign, outwards, reach)
-    lines = find_clamp(
-        grey, curve, expected=state.first - (0.25 * width if turn == 0 else 0.0),
-        width=width, blur=state.blur, contrast=edges.contrast,
-        reach=1.3 * width if turn == 0 else 0.3 * width + 3.0, sign=sign,
-        fine=turn >= _FINE,
-    )  # fmt: skip
+    lines = _clamp_lines(grey, state, seen, sign, turn)
     return tip, lines, _first(lines, state.face_px)
+
+
+def _clamp_lines(
+    grey: Image, state: State, seen: Seen, sign: float, turn: int
+) -> ClampLines:
+    """Return the lines at a clamp, but not the front of its shade."""
+
+    def between_places(low: float, high: float, contrast: float) -> ClampLines:
+        return find_clamp(
+            grey, state.curve, expected=0.5 * (low + high), width=state.width,
+            blur=state.blur, contrast=contrast, reach=0.5 * (high - low), sign=sign,
+            fine=turn >= _FINE,
+        )  # fmt: skip
+
+    width, contrast = state.width, seen.edges.contrast
+    low, high = state.first - 0.3 * width - 3.0, state.first + 0.3 * width + 3.0
+    if turn == 0:
+        low, high = state.first - 1.55 * width, state.first + 1.05 * width
+    lines = between_places(low, high, contrast)
+    if lines.face is None and lines.front is None:
+        return between_places(low, high, _SHADED * contrast)
+    outer = _shade_line(lines, state, seen)
+    if outer is None:
+        return lines
+    outer -= clear_of(state.blur) + _LAG_PX
+    inner = between_places(low, outer, _SHADED * contrast)
+    return lines if inner.face is None and inner.front is None else inner
+
+
+def _shade_line(lines: ClampLines, state: State, seen: Seen) -> float | None:
+    """Return where the border of a shade was taken for the front of the clamp.
+
+    Behind a front there are no edges of the rod, unless the camera sees its face.
+    """
+    line = lines.front
+    if line is None:
+        return None
+    clear = clear_of(state.blur)
+    behind = (seen.s > state.first + clear) & (seen.s < line.s - clear)
+    long = line.s - state.first > max(_LEAST_SHADE * state.width, 2.0 * clear)
+    on_face = is_face(line.s - state.first, state.face_px)
+    if not long or on_face or not behind.any():
+        return None
+    return line.s if seen.good[behind].mean() > _SEEN_ON else None
 
 
 def _face_seen(state: State, walls: Walls) -> float:

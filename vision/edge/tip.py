@@ -28,8 +28,9 @@ Image = NDArray[np.float32]
 
 _SHARE = 0.62
 """Part of the width that the lanes cover: clear of blurred or rounded corners."""
-_SHADE = 0.3
-"""Light of the deepest shade on paper, over paper's above the rod's."""
+_SHADE = 0.15
+"""Light, over paper's above the rod's, that is half way to the deepest shade on paper:
+it keeps 0.3 of the light."""
 _STEP_SIDE_PX, _SOFTER, _FACE_SEEN = 2.0, 1.8, 1.3
 """How far about a place its slope is looked for; how much less steep a shade ends than
 its rod; and how much more of an end face may be seen than its width tells."""
@@ -119,7 +120,8 @@ def _rough_end(
     if not hits.size:
         return None
     end = float(s[hits[0]])
-    shade = float(s[np.flatnonzero((light > _SHADE) & within)[0]])
+    dark = np.flatnonzero((light < _SHADE) & within & (s < end))
+    shade = float(s[dark[-1] + 1] if dark.size else s[within][0])
     if face is None:
         soft = _SOFTER * _rise(light, s, end) < _rise(light, s, shade)
         face = 0.0 if soft else inner

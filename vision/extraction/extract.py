@@ -26,6 +26,7 @@ from .quality import OTHER_ROD, TIP_GOES_ON, doubts, refusal
 from .refine import Refined, refine
 from .setting import Setting
 from .specimen_frame import measurement
+from .two_levels import rod_alone
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -164,6 +165,9 @@ def measure_candidate(
     """
     grey, sign = view.grey, view.sign
     start = _start(grey, candidate, sign)
+    alone = None if start.rough else rod_alone(view, start, candidate)
+    if alone is not None:
+        candidate, start = alone, _start(grey, alone, sign)
     if start.rough:
         # Strands, gaps and hairs blurred away, what is left is how much is rod.
         blur = SMOOTH * start.width

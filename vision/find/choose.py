@@ -254,7 +254,8 @@ def _refuse_second(first: Candidate, rods: list[Candidate]) -> None:
         and (first.root != "clamp" or other.root == "clamp")
     ]
     if alike:
-        raise _too_many([first, *alike], [])
+        rods = [first, *alike]
+        raise _too_many(rods, [rod.points_px for rod in rods[:_SHOWN]])
 
 
 def _accept(rod: Candidate) -> Candidate:

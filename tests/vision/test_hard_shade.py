@@ -1,0 +1,78 @@
+"""Hard shades in drawings by plain OpenCV: the rod is measured without them."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from magbend.vision import as_photo, extract
+from magbend.vision.camera.calibrate import calibrate_known_length
+
+SIZE, FINE, WIDTH = (800, 500), 2, 20.0
+BLACK, RED = (0.025, 0.025, 0.025), (0.05, 0.04, 0.45)
+ROOT = np.array([200.0, 240.0])
+CLAMP = ROOT + np.array([[0, 90], [0, -90], [-110, -90], [-110, 90]])
+SCALE = calibrate_known_length(
+    SIZE, from_px=(0.0, 0.0), to_px=(400.0, 0.0), length_mm=20.0
+)
+
+
+def covered(corners):
+    mask = np.zeros((SIZE[1] * FINE, SIZE[0] * FINE), np.uint8)
+    fixed = np.round(((corners + 0.5) * FINE - 0.5) * 16).astype(np.int32)
+    cv2.fillPoly(mask, [fixed.reshape(-1, 1, 2)], 255, shift=4)
+    return cv2.resize(mask, SIZE, interpolation=cv2.INTER_AREA)[..., None] / 255.0
+
+
+def axis(turn_deg, length=400.0):
+    theta = np.radians(turn_deg) * np.linspace(0.0, 1.0, 400)
+    step = length / 400.0 * np.column_stack([np.cos(theta), np.sin(theta)])
+    return ROOT + np.cumsum(step, axis=0), theta
+
+
+def drawn(*, rod, turn_deg, shade_px, deep, clamp=0.2, clamp_shade=1.8):
+    """Return a photograph of a rod whose shade is moved by `shade_px`."""
+    points, theta = axis(turn_deg)
+    aside = 0.5 * WIDTH * np.column_stack([-np.sin(theta), np.cos(theta)])
+    body = np.vstack([points + aside, (points - aside)[::-1]])
+    moved = np.asarray(shade_px, float)
+    both = np.vstack([CLAMP, CLAMP + clamp_shade * moved]).astype(np.float32)
+    shade = np.maximum(
+        covered(body + moved), covered(cv2.convexHull(both)[:, 0].astype(float))
+    )
+    light = np.full((SIZE[1], SIZE[0], 3), 0.7) * (1.0 - deep * shade)
+    for colour, corners in ((rod, body), ((clamp,) * 3, CLAMP)):
+        light += (np.array(colour) - light) * covered(corners)
+    light = cv2.GaussianBlur(light, (0, 0), 1.0)
+    light += np.random.default_rng(3).normal(0.0, 0.004, light.shape)
+    pixels = 255.0 * (1.055 * np.clip(light, 0.004, 1.0) ** (1 / 2.4) - 0.055)
+    return as_photo(np.rint(pixels).astype(np.uint8))
+
+
+def measured(**what):
+    found = extract(drawn(**what), SCALE, rod_height_mm=0.0)
+    assert found.ok, found.reason
+    return found
+
+
+@pytest.mark.parametrize("shade_px", [(10, 2), (11, 9), (8, 30)])
+def test_the_front_of_a_clamps_shade_is_not_the_clamp(shade_px):
+    found = measured(rod=RED, turn_deg=25.0, shade_px=shade_px, deep=0.55)
+    assert abs(found.clamp_px[0] - ROOT[0]) < 1.5
+    assert abs(found.length_mm - 20.0) < 0.08
+
+
+@pytest.mark.parametrize(("rod", "deep"), [(RED, 0.66), (BLACK, 0.68)])
+def test_a_rod_is_measured_without_the_shade_along_it(rod, deep):
+    found = measured(rod=rod, turn_deg=5.0, shade_px=(-6, 17), deep=deep)
+    assert found.width_px == pytest.approx(WIDTH, rel=0.03)
+    truth, _ = axis(5.0)
+    away = [np.hypot(*(truth - point).T).min() for point in found.points_px[:-1]]
+    assert max(away) < 1.0
+
+
+def test_a_black_rod_ends_before_its_deep_shade():
+    shade_px = (12.0 * np.cos(np.radians(40.0)), 12.0 * np.sin(np.radians(40.0)))
+    found = measured(rod=BLACK, turn_deg=40.0, shade_px=shade_px, deep=0.69)
+    assert np.hypot(*(found.tip_px - axis(40.0)[0][-1])) < 1.0
