@@ -35,21 +35,6 @@ def cos_deg(angle_deg: float) -> float:
     return 0.0 if angle_deg % 180.0 == 90.0 else math.cos(math.radians(angle_deg))
 
 
-def m_from_mm(length_mm: float) -> float:
-    """Return a length in m."""
-    return length_mm * 1e-3
-
-
-def mm_from_m(length_m: float) -> float:
-    """Return a length in mm."""
-    return length_m * 1e3
-
-
-def Pa_from_MPa(stress_MPa: float) -> float:
-    """Return a modulus or stress in Pa."""
-    return stress_MPa * 1e6
-
-
 def T_from_mT(flux_mT: float) -> float:
     """Return a flux density in T."""
     return flux_mT * 1e-3

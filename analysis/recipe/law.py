@@ -29,7 +29,6 @@ from .rods import Rods
 
 Array = NDArray[np.float64]
 
-COEFFICIENTS = ("a", "b", "c", "d", "e")
 PRIOR = ((2.0, 3.0), (1.5, 3.0), (4.0, 3.0), (4.0, 3.0), (1.0, 0.5))
 """Mean and standard deviation of each. c: Guth's 1 + 2.5 v + 14.1 v^2 rises by 2.5 v at
 first and 6 v at v = 0.2. b: rigid PCL is stiffer, by a factor nobody stated. e: diluted

@@ -201,11 +201,6 @@ class TwinBench:
             self.board, self._camera, self._noise, light=LIGHT, paper_seed=self._seed
         )
 
-    def photograph_empty_clamp(self, gap_mm: float) -> NDArray[np.uint8]:
-        """Return a picture in which the rod has fallen out of the clamp."""
-        scene = replace(self._scene(gap_mm), centreline=None)
-        return expose(paint_scene(scene, self._camera), LIGHT, self._noise)
-
     def _state(self, gap_mm: float) -> object:
         """Return what the picture of a still scene depends on."""
         return gap_mm

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.centreline import Centreline
-from ...core.errors import InputError, MagbendError
+from ...core.errors import MagbendError
 from ...core.magnet import Magnet
 from ...core.specimen import Specimen
 from ..workspace import BenchFiles
@@ -183,17 +183,3 @@ def shape_mm(found: Any) -> list[list[float]] | None:
         return None
     points: list[list[float]] = np.round(found.centreline.points_mm, 3).tolist()
     return points
-
-
-def require_files(files: BenchFiles) -> None:
-    """Refuse to predict without a rod and a magnet.
-
-    Raises
-    ------
-    InputError
-        If the specimen or the magnet is not known.
-    """
-    if files.specimen is None or files.rig is None or files.rig.magnet is None:
-        raise InputError(
-            "a prediction needs the specimen file and [magnet] in the rig file"
-        )

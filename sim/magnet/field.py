@@ -40,8 +40,6 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _NODES = np.ascontiguousarray(_NODES)
 _WEIGHTS = np.ascontiguousarray(_WEIGHTS / 2.0)
 
-BLOCK_SIZE = 16
-
 
 def magnet_block(
     magnet: Magnet, *, length_mm: float, gap_mm: float

@@ -25,7 +25,6 @@ from ..picture.photo import Photo
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
-Waves = NDArray[np.complex128]
 Outline = tuple[Array, Array]
 """Points and normals."""
 

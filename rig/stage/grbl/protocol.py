@@ -16,7 +16,6 @@ from dataclasses import dataclass, field
 SOFT_RESET = b"\x18"
 STATUS = b"?"
 FEED_HOLD = b"!"
-RESUME = b"~"
 JOG_CANCEL = b"\x85"
 
 Triple = tuple[float, ...]
