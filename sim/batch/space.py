@@ -1,9 +1,9 @@
 """`solve_spatial_many`: the tips of many rods in space, on all cores.
 
-Rods go one by one through the solver of single rods (`spatial.newton`), with steps
-three times as long: weight, clamp and sources in any direction, rods curved and
-magnetised across their axis. Those that stay in the plane are quicker with
-`batch.tips.solve_many`.
+Weight, clamp and sources in any direction, rods curved and magnetised across their
+axis. Stable ones in a uniform field or before a cuboid go side by side
+(`batch.space_lanes`), the rest one by one (`spatial.rows`). Rods that stay in the plane
+are quicker with `batch.tips.solve_many`.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ from ..spatial.march import AXIAL, C1, C2, C3, K2, MU1, MU2, WIDTH, WX, WZ, H
 from ..spatial.rod import clamp_of
 from ..spatial.rows import BEYOND, solve_rods
 from .columns import at_most, check_source, columns_of
+from .lanes import HARD
+from .space_lanes import solve_space_lanes
 from .threads import in_threads
 
 Array = NDArray[np.float64]
@@ -121,10 +123,17 @@ def solve_spatial_many(
         fields = _fields(part, field, total_mm)
         boxes = np.tile(box_mm, (len(rods), 1)) / total_mm[:, None]
         tips, into = np.empty((len(rods), 7)), out[rows]
-        solve_rods(
-            rods, fields, clamp, margins, boxes, tips, into["outcome"],
-            into["morse_index"],
-        )  # fmt: skip
+        outcome, index = np.full(len(rods), HARD, np.int8), np.zeros(len(rods), np.int8)
+        if len(rods) > FEW:
+            solve_space_lanes(rods, fields, clamp, margins, tips, outcome)
+        hard = np.flatnonzero(outcome == HARD)
+        if len(hard):
+            rest = np.empty((len(hard), 7)), outcome[hard], index[hard]
+            solve_rods(
+                rods[hard], fields[hard], clamp, margins[hard], boxes[hard], *rest
+            )
+            tips[hard], outcome[hard], index[hard] = rest
+        into["outcome"], into["morse_index"] = outcome, index
         for k, name in enumerate(TIPS):
             into[name] = tips[:, k] * (total_mm if k < 3 else 1.0)
         into["error_mm"] = tips[:, 6] * total_mm
