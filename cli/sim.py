@@ -18,11 +18,11 @@ from . import (
     sim_sweep,
 )
 from .console import group, print_json, say
-from .sim_case import field_of, rod_of
+from .sim_case import field_of, only_with, rod_of
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
-    from ..sim import Field, Solution, Support
+    from ..sim import Field, Solution
 
 app = group(
     "sim",
@@ -44,6 +44,7 @@ SHAPE_EXAMPLE = (
 
 @app.command("shape", epilog=SHAPE_EXAMPLE)
 def shape(
+    context: typer.Context,
     gmc: Annotated[
         int | None, typer.Option(help="Rod of the paper's Table 1, 1 to 7.")
     ] = None,
@@ -90,19 +91,29 @@ def shape(
     from ..core.files import output_file
     from ..core.jit import once
     from ..sim import Support, solve
+    from ..sim import verify as check
 
     rod = _specimen(gmc, specimen, remeasured, density_kg_m3)
-    field = _field(field_mT, angle_deg, magnet, gap_mm)
     support = Support(
         clamp_angle_deg=clamp_angle_deg,
         gravity_m_s2=gravity_m_s2,
         load_factor=load_factor,
     )
-    if poisson is not None and model == "rod":
-        raise typer.BadParameter(
-            "--poisson belongs to --model solid; a plain rod twists with the "
-            "poisson_ratio of its specimen file"
-        )
+    only_with(context, "--angle-deg", owner="--field-mT", holds=field_mT is not None)
+    only_with(
+        context, "--density-kg-m3", owner="--gravity-m-s2", holds=any(gravity_m_s2)
+    )
+    only_with(
+        context, "--points", owner="--out or --json", holds=as_json or out is not None
+    )
+    only_with(context, "--verify", owner="--model rod", holds=model == "rod")
+    only_with(
+        context, "--poisson",
+        owner="--model solid; a plain rod twists with the poisson_ratio of its "
+        "specimen file",
+        holds=model != "rod",
+    )  # fmt: skip
+    field = _field(field_mT, angle_deg, magnet, gap_mm)
     if out is not None:
         output_file(out)
     solution = once(
@@ -117,7 +128,11 @@ def shape(
     )
     data = _summary(rod, model, solution)
     if verify:
-        data["check_mm"] = _check(rod, field, support, model, solution)
+        data["check_mm"] = (
+            check(rod, field, solution, support=support)
+            if solution.centreline is not None
+            else None
+        )
     if out is not None:
         _write(solution, rod, out)
     if as_json:
@@ -171,18 +186,6 @@ def _summary(rod: Specimen, model: str, solution: Solution) -> dict[str, Any]:
         data["ending"] = asdict(solution.ending)
     data["flux_tip_mT"] = solution.flux_tip_mT
     return data
-
-
-def _check(
-    rod: Specimen, field: Field, support: Support, model: str, solution: Solution
-) -> float | None:
-    if model != "rod":
-        raise typer.BadParameter("--verify belongs to --model rod")
-    if solution.centreline is None:
-        return None
-    from ..sim import verify
-
-    return verify(rod, field, solution, support=support)
 
 
 def _write(solution: Solution, rod: Specimen, out: Path) -> None:

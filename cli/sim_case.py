@@ -12,6 +12,19 @@ if TYPE_CHECKING:
     from ..sim import Field
 
 
+def only_with(context: typer.Context, option: str, *, owner: str, holds: bool) -> None:
+    """Refuse an option that was typed where it would change nothing.
+
+    Raises
+    ------
+    BadParameter
+        If it was, and not `holds`: it belongs to `owner`, which is missing.
+    """
+    source = context.get_parameter_source(option.strip("-").replace("-", "_"))
+    if not holds and source is not None and source.name == "COMMANDLINE":
+        raise typer.BadParameter(f"{option} belongs to {owner}")
+
+
 def rod_of(gmc: int | None, file: Path | None, remeasured: bool = False) -> Specimen:
     """Return a rod of Table 1 or of a specimen file.
 

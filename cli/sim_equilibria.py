@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import print_json, say
-from .sim_case import field_of, rod_of
+from .sim_case import field_of, only_with, rod_of
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
@@ -20,6 +20,7 @@ EXAMPLE = (
 
 
 def equilibria(
+    context: typer.Context,
     gmc: Annotated[
         int | None, typer.Option(help="Rod of the paper's Table 1, 1 to 7.")
     ] = None,
@@ -59,6 +60,10 @@ def equilibria(
     from ..sim.equilibria import find_equilibria, trace_branches
 
     rod = rod_of(gmc, specimen, remeasured)
+    only_with(
+        context, "--angle-deg", owner="a uniform field, not to --magnet",
+        holds=magnet is None,
+    )  # fmt: skip
     if magnet is None and field_mT is None:
         field_mT = 50.0
     field = field_of(magnet, gap_mm, field_mT, angle_deg)

@@ -21,7 +21,9 @@ def magnet(
         Path | None,
         typer.Argument(help="CSV: gap_mm,flux_mT[,sd_mT]. Without: the paper's three."),
     ] = None,
-    side_mm: Annotated[float, typer.Option(help="Side of the cube, in mm.")] = 55.0,
+    side_mm: Annotated[
+        float | None, typer.Option(help="Side of the cube, in mm; 55 by default.")
+    ] = None,
     sides_mm: Annotated[
         tuple[float, float, float] | None,
         typer.Option(help="Three sides instead, the last along the polarisation."),
@@ -40,7 +42,9 @@ def magnet(
     """Fit a magnet's remanence to readings on its axis, and judge each reading."""
     from ..sim import fit_magnet, paper_readings, read_readings
 
-    sides = sides_mm or (side_mm, side_mm, side_mm)
+    if side_mm is not None and sides_mm is not None:
+        raise typer.BadParameter("give either --side-mm of a cube or --sides-mm")
+    sides = sides_mm or (55.0 if side_mm is None else side_mm,) * 3
     printed: list[dict[str, float]] = []
     if readings is None:
         paper = paper_readings()

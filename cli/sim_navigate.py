@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import print_json, say
-from .sim_case import field_of, rod_of
+from .sim_case import field_of, only_with, rod_of
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
@@ -23,6 +23,7 @@ EXAMPLE = (
 
 
 def navigate(
+    context: typer.Context,
     lumen: Annotated[Path, typer.Argument(help="Lumen file (TOML).")],
     gmc: Annotated[
         int | None, typer.Option(help="Rod of the paper's Table 1, 1 to 7.")
@@ -77,7 +78,16 @@ def navigate(
     from ..sim import navigate as navigation
 
     rod = rod_of(gmc, specimen)
-    field = _field(field_mT, (angle_deg, elevation_deg), magnet, gap_mm, poses)
+    table = navigation.read_poses(poses) if poses is not None else []
+    known = set(table[0]) if table else set()
+    for option, key in (
+        ("--angle-deg", "angle_deg"), ("--elevation-deg", "elevation_deg")
+    ):  # fmt: skip
+        only_with(
+            context, option, owner=f"--field-mT, or poses with flux_mT but no {key}",
+            holds=(field_mT is not None or "flux_mT" in known) and key not in known,
+        )  # fmt: skip
+    field = _field(field_mT, (angle_deg, elevation_deg), magnet, gap_mm, table)
     place = navigation.read_lumen(lumen)
     if out is not None:
         output_folder(out)
@@ -106,26 +116,23 @@ def _field(
     angles_deg: tuple[float, float],
     file: Path | None,
     gap_mm: float | None,
-    poses: Path | None,
+    table: list[dict[str, float]],
 ) -> Any:
-    from ..sim import Field, Uniform, UniformField
-    from ..sim.navigate import moving, read_poses
+    from ..sim import Field, Uniform
+    from ..sim.navigate import moving
 
-    table = read_poses(poses) if poses is not None else []
     if table and field_mT is not None and "flux_mT" in table[0]:
         raise typer.BadParameter("give either --field-mT or flux_mT in the poses")
     if table and gap_mm is not None and "gap_mm" in table[0]:
         raise typer.BadParameter("give either --gap-mm or gap_mm in the poses")
     angle_deg, elevation_deg = angles_deg
-    field: Field = UniformField(flux_mT=0.0, angle_deg=angle_deg)
-    if field_mT is not None or file is not None or gap_mm is not None:
-        field = field_of(file, gap_mm, field_mT, angle_deg)
-    if elevation_deg:
-        if field_mT is None:
-            raise typer.BadParameter("--elevation-deg belongs to --field-mT")
-        field = Field(
-            Uniform(flux_mT=field_mT, angle_deg=angle_deg, elevation_deg=elevation_deg)
+    field = Field(
+        Uniform(
+            flux_mT=field_mT or 0.0, angle_deg=angle_deg, elevation_deg=elevation_deg
         )
+    )
+    if file is not None or gap_mm is not None:
+        field = field_of(file, gap_mm, field_mT, angle_deg)
     if field.follows_gap and "gap_mm" not in (table or [{}])[0]:
         raise typer.BadParameter("--magnet needs --gap-mm D, or poses with gap_mm")
     return moving(field, table) if table else field

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import print_json, say
-from .sim_case import field_of, rod_of
+from .sim_case import field_of, only_with, rod_of
 
 if TYPE_CHECKING:
     from ..sim import Path as Followed
@@ -21,6 +21,7 @@ _HOW = "from:to[:back...]"
 
 
 def path(
+    context: typer.Context,
     gmc: Annotated[
         int | None, typer.Option(help="Rod of the paper's Table 1, 1 to 7.")
     ] = None,
@@ -76,6 +77,10 @@ def path(
         "offset_y_mm": offset_y_mm, "clamp_angle_deg": clamp_angle_deg,
         "insertion_mm": insertion_mm,
     }  # fmt: skip
+    only_with(
+        context, "--angle-deg", holds=field_mT is not None or ":" in angle_deg,
+        owner="--field-mT; a source file has its own directions",
+    )  # fmt: skip
     legs = {name: text for name, text in given.items() if text and ":" in text}
     if not legs:
         raise typer.BadParameter(f"give one option {_HOW}, such as --gap-mm 120:30:120")
@@ -86,21 +91,26 @@ def path(
             f"one of them {_HOW} and give the others as one number, or not at all"
         )
     quantity, text = next(iter(legs.items()))
-    fixed = {name: text for name, text in given.items() if name not in legs and text}
+    waypoints = [_number(quantity, part) for part in text.split(":")]
+    kept = {
+        name: _number(name, text)
+        for name, text in given.items()
+        if name not in legs and text
+    }
     rod = rod_of(gmc, specimen)
+    angle = kept.pop("angle_deg", 90.0)
+    gap, flux = kept.pop("gap_mm", None), kept.pop("flux_mT", None)
     field = field_of(
-        magnet,
-        None if quantity == "gap_mm" else _number("--gap-mm", fixed.get("gap_mm")),
-        1.0 if quantity == "flux_mT" else _number("--field-mT", fixed.get("flux_mT")),
-        90.0 if quantity == "angle_deg" else _number("--angle-deg", angle_deg) or 0.0,
+        magnet, gap, waypoints[0] if quantity == "flux_mT" else flux, angle
     )
+    if field.follows_gap and quantity != "gap_mm":
+        raise typer.BadParameter("--magnet needs --gap-mm D")
     for file in (out, figure, animation):
         if file is not None:
             output_file(file)
-    waypoints = [_number(f"--{quantity}", part) or 0.0 for part in text.split(":")]
     support = Support(gravity_m_s2=gravity_m_s2)
-    legs_of: dict[str, Any] = {quantity: waypoints}
-    found = follow_path(rod, field, support=support, steps=steps, **legs_of)
+    along: dict[str, Any] = kept | {quantity: waypoints}
+    found = follow_path(rod, field, support=support, steps=steps, **along)
     _write(found, rod.name, out, figure, animation)
     if as_json:
         print_json(_data(rod.name, found))
@@ -112,14 +122,12 @@ def _option(name: str) -> str:
     return "--field-mT" if name == "flux_mT" else f"--{name.replace('_', '-')}"
 
 
-def _number(option: str, text: str | None) -> float | None:
-    if text is None:
-        return None
+def _number(name: str, text: str) -> float:
     try:
         return float(text)
     except ValueError:
         raise typer.BadParameter(
-            f"{option.replace('_', '-')} must be numbers, as 120:30:120 is; instead "
+            f"{_option(name)} must be a number or, as 120:30:120, several; instead "
             f"received {text!r}"
         ) from None
 
@@ -170,6 +178,7 @@ def _data(name: str, found: Followed) -> dict[str, Any]:
                 "kind": one.kind,
                 "tip_mm": one.tip_mm,
                 "turning": one.turning,
+                "branches_mm": one.branches_mm,
             }
             for one in found.folds
         ],
@@ -186,6 +195,10 @@ def _print(name: str, found: Followed, files: list[Path | None]) -> None:
             f"  {one.kind:8} at {one.value:.6g} {unit}, {quantity} {one.direction}, "
             f"tip ({x:.4f}, {y:.4f}) mm"
         )
+        for x, y in one.branches_mm:
+            say(
+                f"           beside the straight rod: stable, tip ({x:.4f}, {y:.4f}) mm"
+            )
     lost = sum(one.centreline is None for one in found.points)
     if not found.folds and not lost:
         say("  no fold: it would go back the way it came")

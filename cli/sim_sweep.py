@@ -8,17 +8,21 @@ from typing import Annotated
 import typer
 
 from .console import print_json, progress, say
+from .sim_case import only_with, rod_of
 
 EXAMPLE = "Example: magbend sim sweep field angle --gmc 2 --out studies"
 NAMES = ("field", "angle", "stiffness", "length", "side")
 
 
 def sweep(
+    context: typer.Context,
     studies: Annotated[
         list[str] | None,
         typer.Argument(help="field, angle, stiffness, length, side; all by default."),
     ] = None,
-    gmc: Annotated[int, typer.Option(help="Rod of Table 1, 1 to 7.")] = 2,
+    gmc: Annotated[
+        int | None, typer.Option(help="Rod of Table 1, 1 to 7; 2 by default.")
+    ] = None,
     specimen: Annotated[
         Path | None, typer.Option(help="Specimen file (TOML) instead.")
     ] = None,
@@ -42,19 +46,17 @@ def sweep(
     unknown = [name for name in names if name not in NAMES]
     if unknown:
         raise typer.BadParameter(f"{unknown[0]!r} is none of {', '.join(NAMES)}")
-    if values is not None and len(names) != 1:
-        raise typer.BadParameter("--values belongs to one study: name it")
+    only_with(context, "--values", owner="one study: name it", holds=len(names) == 1)
+    for option, study in (("--field-mT", "field"), ("--angle-deg", "angle")):
+        only_with(
+            context, option, owner=f"the studies that keep it, not to {study}",
+            holds=names != [study],
+        )  # fmt: skip
     from ..core.files import output_folder, write_text
     from ..sim import STUDIES, UniformField, draw_study, sweep_csv
-    from ..sim import gmc as table1
     from ..sim import sweep as solve_study
 
-    if specimen is None:
-        rod = table1(gmc)
-    else:
-        from ..core.specimen_file import read_specimen
-
-        rod = read_specimen(specimen)
+    rod = rod_of(2 if gmc is None and specimen is None else gmc, specimen)
     if studies is None and len(rod.sections) != 3:
         names.remove("length")  # its default values are for three sections
     field = UniformField(flux_mT=field_mT, angle_deg=angle_deg)

@@ -22,12 +22,14 @@ def real_array(values: ArrayLike, quantity: str, unit: str = "") -> NDArray[np.f
     InputError
         If it is no array of finite real numbers.
     """
+    of, colon, name = quantity.rpartition(": ")
+    each = f"{of}{colon}every {name}"
     try:
         given = np.asarray(values)
     except (ValueError, TypeError):  # rows of unequal length
         given = np.array("")
     if given.dtype.kind == "O":  # a list with None, or integers beyond 64 bits
-        numbers = [finite(value, f"every {quantity}", unit) for value in given.flat]
+        numbers = [finite(value, each, unit) for value in given.flat]
         given = np.array(numbers, dtype=np.float64).reshape(given.shape)
     if given.dtype.kind not in "fiu":
         raise InputError(
@@ -36,5 +38,5 @@ def real_array(values: ArrayLike, quantity: str, unit: str = "") -> NDArray[np.f
         )
     bad = ~np.isfinite(given)
     if np.any(bad):
-        finite(given[bad].flat[0], f"every {quantity}", unit)
+        finite(given[bad].flat[0], each, unit)
     return np.ascontiguousarray(given, dtype=np.float64).reshape(given.shape)

@@ -13,7 +13,15 @@ from .errors import InputError
 
 def shown(value: object) -> str:
     """Return `value` as an error message quotes it: short, whatever it is."""
-    return reprlib.repr(value)
+    return reprlib.repr(_plain(value))
+
+
+def _plain(value: object) -> object:
+    """Return numpy's numbers as Python's, and all else as it is."""
+    if getattr(value, "ndim", None) == 0 and hasattr(value, "item"):
+        plain: object = value.item()
+        return plain
+    return value
 
 
 def finite(value: SupportsFloat, quantity: str, unit: str = "") -> float:
@@ -41,9 +49,8 @@ def finite(value: SupportsFloat, quantity: str, unit: str = "") -> float:
 
 def _real(value: object) -> float:
     """Return a real number as a float, and NaN for whatever else."""
-    if getattr(value, "ndim", None) == 0 and hasattr(value, "item"):
-        # Numpy's numbers, of which complex ones would drop a part with a warning.
-        value = value.item()
+    # Of numpy's numbers complex ones would drop a part with a warning.
+    value = _plain(value)
     if not hasattr(value, "__float__") or getattr(value, "ndim", 0) != 0:
         return math.nan
     try:

@@ -116,15 +116,6 @@ from .path.draw import (
     pull_in_csv as pull_in_csv,
 )
 from .path.follow import (
-    Path as Path,
-)
-from .path.follow import (
-    PathFold as PathFold,
-)
-from .path.follow import (
-    PathPoint as PathPoint,
-)
-from .path.follow import (
     follow_path as follow_path,
 )
 from .path.pull_in import (
@@ -132,6 +123,15 @@ from .path.pull_in import (
 )
 from .path.pull_in import (
     pull_in_gaps as pull_in_gaps,
+)
+from .path.records import (
+    Path as Path,
+)
+from .path.records import (
+    PathFold as PathFold,
+)
+from .path.records import (
+    PathPoint as PathPoint,
 )
 from .planar.march import (
     march as march,

@@ -18,8 +18,10 @@ from .solution import Ending
 Array = NDArray[np.float64]
 Case = tuple[Array, Array, float, float]
 
-TILT = 1e-3
-"""Turn of the clamp, in rad, that makes a symmetric rod choose its side."""
+TILTS = (*(1e-3 / 4.0**k for k in range(11)), 0.0)
+"""Turns of the clamp, in rad, that make a symmetric rod choose its side, and back."""
+STRAIGHT = 1e-9
+"""Curvature, times the length, of a rod that counts as straight."""
 
 
 def ending(case: Case, load: float, length_mm: float) -> Ending:
@@ -51,18 +53,19 @@ def buckled_tips(case: Case, length_mm: float) -> tuple[tuple[float, float], ...
     """Return the tips of the stable shapes to which a straight unstable rod buckles.
 
     The clamp turned a little to either side leads to them, and they stay as it turns
-    back.
+    back: little by little, since near a bifurcation they change as its cube root. A
+    turn too large for Newton brings the next one nearer all the same.
     """
     rod, field, clamp, margin = case
+    rest = margin, stations(2), ORDER, STEP
     tips = []
-    for tilt in (TILT, -TILT):
-        turned = solve_planar(
-            rod, field, clamp + tilt, margin, stations(2), ORDER, STEP
-        )
+    for side in (1.0, -1.0):
+        turned = solve_planar(rod, field, clamp + side * TILTS[0], *rest)
         if turned[0] > OK_UNSTABLE:
             continue
         u, out = turned[-1], np.empty((4, 2))
-        index = settle(rod, field, clamp, margin, stations(2), ORDER, STEP, u, out)
+        for tilt in TILTS[1:]:
+            index = settle(rod, field, clamp + side * tilt, *rest, u, out)
         if index == 0 and math.isfinite(out[0, -1]):
             tips.append((float(out[0, -1]) * length_mm, float(out[1, -1]) * length_mm))
     return tuple(tips)

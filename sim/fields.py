@@ -249,7 +249,12 @@ def gap_of(field: object) -> str:
     ]
     if gaps:
         return " and ".join(f"{gap:g} mm" for gap in gaps)
-    return shown(field)
+    return kinds_of(as_field(field))
+
+
+def kinds_of(field: Field) -> str:
+    """Return what a message says of the sources of a field: their kinds, in order."""
+    return ", ".join(source.kind for source in field.sources)
 
 
 def before(magnet: Magnet | Field) -> Field:
@@ -343,10 +348,26 @@ def check_plain(specimen: Specimen) -> None:
     """
     if not specimen.is_plain:
         raise InputError(
-            f"specimen {specimen.name!r} must have natural_curvature_per_mm in 1/mm "
-            "and remanence_y_mT and remanence_z_mT in mT of 0 here; instead received "
-            "another: the plain rod of solve and solve_spatial takes it"
+            f"specimen {specimen.name!r} must be straight and magnetised along its "
+            f"axis here, which is planar; instead received {_unplain(specimen)}: "
+            "`magbend sim shape` (solve, solve_spatial) takes it"
         )
+
+
+def _unplain(specimen: Specimen) -> str:
+    """Return the first number of a rod that no planar solver takes."""
+    across = specimen.transverse_mT
+    numbers = {
+        "natural_curvature_per_mm": (specimen.natural_curvatures_per_mm, "1/mm"),
+        "remanence_y_mT": ([y for y, _ in across], "mT"),
+        "remanence_z_mT": ([z for _, z in across], "mT"),
+    }
+    return next(
+        f"{name} {value:g} {unit}"
+        for name, (values, unit) in numbers.items()
+        for value in values
+        if value
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,7 +14,7 @@ from ..core.errors import InputError
 from ..core.jit import plain_first
 from ..core.specimen import Specimen
 from ..core.units import mT_from_T, rad_from_deg
-from .ending import buckled_tips, ending
+from .ending import STRAIGHT, buckled_tips, ending
 from .fields import (
     PULLED_IN,
     STABLE,
@@ -37,8 +37,6 @@ NO_SUPPORT = Support()
 POINTS = 61
 """Points of a shape, by default."""
 Tips = tuple[tuple[float, float], ...]
-STRAIGHT = 1e-9
-"""Curvature, times the length, of a rod that counts as straight."""
 
 
 @plain_first(solve_rows)

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
+from ...core.checks import shown
 from ...core.errors import InputError
 from ...core.magnet import Magnet
 from ...core.specimen import Specimen
@@ -107,7 +108,7 @@ class Nuisance:
             if value is None or not (math.isfinite(value) and value >= 0.0):
                 raise InputError(
                     f"prior of {name} must be zero (held) or above; "
-                    f"instead received {value!r}"
+                    f"instead received {shown(value)}"
                 )
 
     def frame_sd_deg(self, stated_deg: float) -> float:

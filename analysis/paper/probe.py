@@ -54,7 +54,7 @@ def probe_factor(side_mm: float, length_mm: float, standoff_mm: float) -> float:
     near = finite(standoff_mm, "standoff_mm", "mm")
     if near < 0.0:
         raise InputError(
-            f"standoff_mm must be zero or above in mm; instead received {standoff_mm!r}"
+            f"standoff_mm must be zero or above in mm; instead received {near:g}"
         )
 
     def face(z: float) -> float:

@@ -51,7 +51,7 @@ class Mixture:
         ):
             if not (math.isfinite(value) and value > 0.0):
                 raise InputError(
-                    f"{name} must be above zero; instead received {value!r}"
+                    f"{name} must be above zero; instead received {value:g}"
                 )
 
     @property

@@ -14,7 +14,7 @@ from ...core.cross_section import ALL_SIZES, SIZES
 from ...core.errors import InputError
 from ...core.magnet import Magnet
 from ...core.sources import FLUX_LIMIT_T
-from ..fields import Field, before
+from ..fields import Field, before, kinds_of
 
 Array = NDArray[np.float64]
 
@@ -109,19 +109,20 @@ def check_magnet(magnet: Magnet | Field) -> None:
         if not magnet.in_plane:
             raise InputError(
                 "magnet of batches must be a field within the plane z = 0, with "
-                f"elevation_deg and z in mm of 0; instead received {shown(magnet)}"
+                "elevation_deg and z in mm of 0; instead received "
+                f"{kinds_of(magnet)} off it"
             )
         return
     if magnet.elevation_deg != 0.0 or magnet.offset_mm[2] != 0.0:
         raise InputError(
             "magnet elevation_deg in deg and offset_mm[2] in mm must be 0 for batches, "
-            f"which are planar; instead received {magnet.elevation_deg!r} deg and "
-            f"{magnet.offset_mm[2]!r} mm"
+            f"which are planar; instead received {magnet.elevation_deg:g} deg and "
+            f"{magnet.offset_mm[2]:g} mm"
         )
     if abs(magnet.remanence_T) > FLUX_LIMIT_T:
         raise InputError(
             f"magnet remanence_T must be within {FLUX_LIMIT_T:g} T; instead received "
-            f"{magnet.remanence_T!r}"
+            f"{magnet.remanence_T:g}"
         )
 
 

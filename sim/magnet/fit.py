@@ -282,7 +282,7 @@ def _checked(
         within(float(value), -3e4, 3e4, "flux_mT", "mT")
         if abs(value) < 1e-6:
             raise InputError(
-                f"flux_mT must be above 1e-06 mT in size; instead received {value!r}"
+                f"flux_mT must be above 1e-06 mT in size; instead received {value:g}"
             )
     for value in () if sd is None else sd:
         size(float(value), "sd_mT", "mT")

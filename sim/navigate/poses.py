@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core.checks import shown
 from ...core.errors import InputError
-from ..fields import Field, UniformField
+from ..fields import Field
 from ..sources import Uniform
 
 KEYS = {
@@ -30,7 +30,8 @@ def moving(
     ----------
     field : Field or None
         Magnets, which the poses move by `gap_mm` and `axis_angle_deg`; None or a
-        uniform field: the poses give `flux_mT` and `angle_deg`. Both take
+        uniform field: the poses give `flux_mT` and `angle_deg`, and what they leave out
+        stays that of the field. Both take
         `elevation_deg`, which leads out of a planar lumen.
     poses : sequence of dict
         Each with `insertion_mm`, rising, and the same other keys. Before the first and
@@ -48,7 +49,10 @@ def moving(
     >>> field(5.0)
     UniformField(flux_mT=10.0, angle_deg=90.0)
     """
-    uniform = field is None or isinstance(field, UniformField)
+    sources: tuple[Any, ...] = (
+        (Uniform(flux_mT=0.0),) if field is None else field.sources
+    )
+    uniform = [one.kind for one in sources] == ["uniform"]
     keys = KEYS[uniform]
     if not poses:
         raise InputError("poses must have at least one pose; instead received none")
@@ -66,7 +70,7 @@ def moving(
             f"insertion_mm of the poses must rise, in mm; instead received {at}"
         )
 
-    if "gap_mm" in given and not any(_takes(one, "gap_mm") for one in field.sources):  # type: ignore[union-attr]
+    if "gap_mm" in given and not any(_takes(one, "gap_mm") for one in sources):
         raise InputError(
             "poses with gap_mm must move a source that stands at a gap; instead all "
             "sources have a centre_mm of their own"
@@ -77,27 +81,18 @@ def moving(
             key: float(np.interp(insertion_mm, at, [pose[key] for pose in poses]))
             for key in given
         }
-        if uniform:
-            start = field if isinstance(field, UniformField) else None
-            pose = {"flux_mT": start.flux_mT if start else 0.0} | now
-            if "elevation_deg" in pose:
-                return Field(Uniform(**pose))
-            return UniformField(**pose)
-        return _moved(field, now)
+        moved = Field(
+            replace(source, **{k: v for k, v in now.items() if _takes(source, k)})
+            for source in sources
+        )
+        return moved.uniform or moved
 
     here(at[0])
     return here
 
 
-def _moved(field: Any, now: dict[str, float]) -> Field:
-    """Return magnets at another pose; sources that stand at a centre stay."""
-    return Field(
-        replace(source, **{k: v for k, v in now.items() if _takes(source, k)})
-        for source in field.sources
-    )
-
-
 def _takes(source: Any, key: str) -> bool:
+    """Tell whether a pose moves a source by this; one at a centre stays there."""
     if key == "gap_mm":
         return source.follows_gap or getattr(source, "gap_mm", None) is not None
     return hasattr(source, key)

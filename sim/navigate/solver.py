@@ -54,7 +54,8 @@ def navigate(
         Insertions to go to, one after the other, in mm: (30, 5) is forth and back. The
         whole rod, if not given.
     step_mm : float
-        Step of the insertion, in mm; where the rod snaps it is refined by itself.
+        Step of the insertion, in mm, up to the rod's length; where the rod snaps it is
+        refined by itself.
     friction : float
         Coefficient of Coulomb friction along the wall; it acts on the rod's axis.
     support : Support
@@ -99,8 +100,8 @@ def navigate(
     elements = whole(elements, 2, 400, "elements")
     limit_N = _limit(push_limit_N)
     step_mm = within(
-        size(step_mm, "step_mm", "mm"), specimen.length_mm / MOST_STEPS, 1e9,
-        "step_mm", "mm",
+        size(step_mm, "step_mm", "mm"), specimen.length_mm / MOST_STEPS,
+        specimen.length_mm, "step_mm", "mm",
     )  # fmt: skip
     walk: PlanarWalk | TubeWalk
     if isinstance(lumen, Tube):

@@ -230,8 +230,8 @@ def _gate(lumen: Lumen, name: str) -> Gate:
             return gate
     names = ", ".join(gate.name for gate in lumen.gates) or "none"
     raise InputError(
-        f"gate must be one of lumen {lumen.name!r}'s, {names}; instead received "
-        f"{name!r}"
+        f"gate must be a gate of the lumen {lumen.name!r}, which has {names}; instead "
+        f"received {name!r}"
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from ...core.errors import InputError
 from ...core.sources import Posed, Uniform
 from ...core.specimen import Specimen
-from ..fields import Field, Support
+from ..fields import Field, Support, kinds_of
 
 Case = tuple[Specimen, Field, Support]
 
@@ -50,7 +50,11 @@ def _of_uniform(key: str) -> Callable[[Specimen, Field, Support, float], Case]:
 def _offset(axis: int) -> Callable[[Specimen, Field, Support, float], Case]:
     def at(rod: Specimen, field: Field, support: Support, value: float) -> Case:
         sources: list[Any] = list(field.sources)
-        moved = [i for i, one in enumerate(sources) if getattr(one, "gap_mm", None)]
+        moved = [
+            i
+            for i, one in enumerate(sources)
+            if isinstance(one, Posed) and one.centre_mm is None
+        ]
         for i in moved:
             shift = np.array(sources[i].offset_mm)
             shift[axis] = value
@@ -99,8 +103,7 @@ def _changed(field: Field, moved: list[bool], key: str, value: float) -> Field:
 
 
 def _no_such(field: Field, key: str) -> InputError:
-    kinds = ", ".join(source.kind for source in field.sources)
     return InputError(
         f"{key} must belong to a source of the field for a path; instead the field has "
-        f"the sources {kinds}"
+        f"the sources {kinds_of(field)}"
     )

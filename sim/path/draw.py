@@ -7,12 +7,14 @@ import io
 from pathlib import Path as File
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.checks import shown
 from ...core.errors import InputError
 from ..study.figures import save
-from .follow import Path
+from ..study.outlines import draw_sources, outlines_mm
 from .pull_in import PullIn
+from .records import Path, PathPoint
 
 COLUMNS = (
     "status", "morse_index", "tip_x_mm", "tip_y_mm", "tip_angle_deg", "energy_uJ",
@@ -41,6 +43,8 @@ def path_csv(path: Path) -> str:
 def draw_path(file: File, path: Path, *, title: str) -> None:
     """Draw the shapes along the path, and the tip over what changes.
 
+    The sources are drawn where they are at the turn, farthest from the first value.
+
     Raises
     ------
     InputError
@@ -56,9 +60,10 @@ def draw_path(file: File, path: Path, *, title: str) -> None:
             shade = (0.15, 0.3 + 0.5 * k / len(path.points), 0.6)
             line = one.centreline
             shapes.plot(line.x_mm, line.y_mm, color=shade, linewidth=1.0)
+    turn = _turn(path)
+    draw_sources(shapes, path.points[turn].field, path.points[turn].length_mm)
     values = [one.value for one in path.points]
     y = [one.centreline.tip_mm[1] if one.centreline else np.nan for one in path.points]
-    turn = int(np.argmax(np.abs(np.array(values) - values[0])))
     there, back = slice(0, turn + 1), slice(turn, None)
     tips.plot(values[there], y[there], "-", color="C0", label="there")
     tips.plot(values[back], y[back], "--", color="C1", label="back")
@@ -82,8 +87,14 @@ def draw_path(file: File, path: Path, *, title: str) -> None:
     save(figure, file)
 
 
+def _turn(path: Path) -> int:
+    """Return the number of the point that is farthest from the first value."""
+    values = np.array([one.value for one in path.points])
+    return int(np.argmax(np.abs(values - values[0])))
+
+
 def animate_path(file: File, path: Path, *, title: str) -> None:
-    """Draw the shapes one after the other as an animated GIF.
+    """Draw shapes and sources one after the other as an animated GIF.
 
     Raises
     ------
@@ -102,8 +113,7 @@ def animate_path(file: File, path: Path, *, title: str) -> None:
             "an animation must be a .gif file of a path that has shapes; instead "
             f"received {shown(str(file))} and {len(lines)} shapes"
         )
-    low = np.min([[line.x_mm.min(), line.y_mm.min()] for line in lines], axis=0) - 2.0
-    high = np.max([[line.x_mm.max(), line.y_mm.max()] for line in lines], axis=0) + 2.0
+    low, high = _view(path)
     name, unit = path.quantity.rsplit("_", 1)
     frames = []
     figure = Figure(figsize=(4.8, 4.0), dpi=90, layout="constrained")
@@ -115,6 +125,7 @@ def animate_path(file: File, path: Path, *, title: str) -> None:
             colour = "C0" if one.status == "stable" else "C3"
             line = one.centreline
             axes.plot(line.x_mm, line.y_mm, color=colour, linewidth=2.5)
+        draw_sources(axes, one.field, one.length_mm)
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
         axes.set_aspect("equal")
@@ -131,6 +142,16 @@ def animate_path(file: File, path: Path, *, title: str) -> None:
         buffer, "GIF", save_all=True, append_images=frames[1:], duration=80, loop=0
     )
     write_bytes(file, buffer.getvalue())
+
+
+def _view(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return corners of a view, in mm, of all shapes and of the sources at the turn."""
+    there: PathPoint = path.points[_turn(path)]
+    lines = [one.centreline for one in path.points if one.centreline is not None]
+    seen = np.vstack(
+        [line.points_mm for line in lines] + outlines_mm(there.field, there.length_mm)
+    )
+    return seen.min(axis=0) - 2.0, seen.max(axis=0) + 2.0
 
 
 def pull_in_csv(found: PullIn) -> str:

@@ -21,7 +21,7 @@ from ...core.cross_section import SIZES
 from ...core.errors import InputError
 from ...core.progress import Progress, silent
 from ...core.specimen import Specimen
-from ..fields import Field, Support, as_field, check_case, check_plain
+from ..fields import Field, Support, as_field, check_case, check_plain, kinds_of
 from .follow import follow_path
 
 Array = NDArray[np.float64]
@@ -101,7 +101,7 @@ def pull_in_gaps(
     if not field.follows_gap:
         raise InputError(
             "a source of the field must wait for its gap_mm in mm (neither centre_mm "
-            f"nor gap_mm) to come nearer; instead received {shown(field)}"
+            f"nor gap_mm) to come nearer; instead received {kinds_of(field)}"
         )
     low, high = (within(value, 1e-6, 1e6, "range_mm", "mm") for value in range_mm)
     if not low < high:

@@ -82,7 +82,7 @@ def rod_array(specimen: Specimen, support: Support) -> Array:
         if abs(remanence_mT) > FLUX_LIMIT_T * 1e3:
             raise InputError(
                 f"remanence_mT must be within {FLUX_LIMIT_T * 1e3:g} mT; instead "
-                f"received {remanence_mT!r}"
+                f"received {remanence_mT:g}"
             )
         # A in mm2 times B_r in mT over mu0 is m in 1e-9 A m; m B is a force in N.
         moment_Am = area_mm2 * remanence_mT * 1e-9 / MU0
@@ -100,7 +100,7 @@ def rod_array(specimen: Specimen, support: Support) -> Array:
     if not np.all(np.isfinite(rod)):
         raise InputError(
             "the specimen's sizes in mm and moduli in MPa must be of comparable size; "
-            f"instead received a rod of {length_mm!r} mm whose loads overflow"
+            f"instead received a rod of {length_mm:g} mm whose loads overflow"
         )
     return rod
 

@@ -105,7 +105,7 @@ def _number(
         scale = min(scale, 20.0 * (0.5 - start))
     if scale <= 0.0 or isinstance(start, bool):
         raise InputError(
-            f"{name} must not be {start!r} where its derivative is asked for: from "
+            f"{name} must not be {start:g} where its derivative is asked for: from "
             "there it cannot change both ways"
         )
     return Move(scale=scale, moved=moved)

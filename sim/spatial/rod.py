@@ -192,6 +192,6 @@ def rod_table(rod: SpatialRod, support: Support) -> Array:
     if not np.all(np.isfinite(table)):
         raise InputError(
             "the rod's sizes in mm and moduli in MPa must be of comparable size; "
-            f"instead received a rod of {length_mm!r} mm whose loads overflow"
+            f"instead received a rod of {length_mm:g} mm whose loads overflow"
         )
     return table

@@ -147,6 +147,11 @@ def test_rods_and_curvatures_beyond_reason_do_not_hang() -> None:
         ({"E_MPa": ["20", "10"]}, "E_MPa must be an array of numbers in MPa"),
         ({"E_MPa": [[1.0], [1.0, 2.0]]}, "E_MPa must be an array of numbers in MPa"),
         ({"remanence_mT": 4e4}, "30000 mT"),
+        (
+            {"flux_mT": np.array([1.0, np.nan])},
+            "designs: every flux_mT must be a finite number in mT; instead received "
+            "nan$",
+        ),
     ],
 )
 def test_columns_that_do_not_fit_are_named(columns, word) -> None:

@@ -158,6 +158,28 @@ def test_wrong_usage_ends_with_2(arguments: tuple[str, ...]) -> None:
 
 
 @pytest.mark.parametrize(
+    ("arguments", "owner"),
+    [
+        ("shape --magnet m.toml --angle-deg 30", "--field-mT"),
+        ("shape --field-mT 5 --density-kg-m3 2000", "--gravity-m-s2"),
+        ("shape --field-mT 5 --points 70", "--out or --json"),
+        ("shape --field-mT 5 --model solid --verify", "--model rod"),
+        ("shape --field-mT 5 --poisson 0.3", "--model solid"),
+        ("equilibria --magnet m.toml --gap-mm 60 --angle-deg 30", "a uniform field"),
+        ("path --magnet m.toml --gap-mm 60:50 --angle-deg 30", "--field-mT"),
+        ("sweep field --field-mT 20", "the studies that keep it"),
+        ("sweep angle --angle-deg 20", "the studies that keep it"),
+    ],
+)
+def test_an_option_that_would_change_nothing_is_refused(
+    arguments: str, owner: str
+) -> None:
+    command, *rest = arguments.split()
+    with pytest.raises(BadParameter, match=f"belongs to {owner}"):
+        run(command, "--gmc", "2", *rest)
+
+
+@pytest.mark.parametrize(
     ("arguments", "pattern"),
     [
         (("--gmc", "9", "--field-mT", "5"), "GMC number"),

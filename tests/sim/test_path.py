@@ -31,10 +31,11 @@ from magbend.sim import (
     gmc,
     solve,
 )
-from magbend.sim.path import follow
+from magbend.sim.path import walk
 from magbend.sim.path.draw import animate_path, draw_path, path_csv
 from magbend.sim.path.energy import energy_uJ
 from magbend.sim.planar.near import settle
+from magbend.sim.study.outlines import outlines_mm
 
 BAR = Rod(
     name="bar", side_mm=1.0, remanence_mT=20.0,
@@ -108,7 +109,7 @@ def test_a_rod_of_many_boundary_layers_is_followed_in_few_steps(
         settled.append(case)
         return settle(*case)
 
-    monkeypatch.setattr(follow, "settle", counted)
+    monkeypatch.setattr(walk, "settle", counted)
     path = follow_path(rod, field, offset_x_mm=(75.0, 70.0), steps=5)
     assert not path.folds
     assert len(settled) < 2_000  # 15 000 where Newton begins from where the rod was
@@ -221,6 +222,7 @@ def test_other_quantities_change_what_they_name() -> None:
         (lambda: follow_path(gmc(2), CUBE), "waypoints of one of gap_mm"),
         (lambda: follow_path(gmc(2), CUBE, gap_mm=(60.0,)), "at least two waypoints"),
         (lambda: follow_path(gmc(2), CUBE, gap_mm=(60.0, math.nan)), "finite"),
+        (lambda: follow_path(gmc(2), CUBE, gap_mm=(60.0, -5.0)), "received -5.0"),
         (lambda: follow_path(gmc(2), CUBE, flux_mT=(1.0, 2.0)), "flux_mT must belong"),
         (lambda: follow_path(gmc(2), CUBE, speed=(1.0, 2.0)), "instead received speed"),
         (
@@ -238,6 +240,63 @@ def test_other_quantities_change_what_they_name() -> None:
 def test_bad_paths_are_refused_in_one_sentence(task: object, said: str) -> None:
     with pytest.raises(InputError, match=said):
         task()
+
+
+def test_what_is_given_as_one_number_is_kept() -> None:
+    path = follow_path(
+        gmc(2), CUBE, gap_mm=(70.0, 60.0), clamp_angle_deg=5.0, offset_x_mm=3.0, steps=1
+    )
+    placed = replace(CUBE, gap_mm=60.0, offset_mm=(3.0, 0.0, 0.0))
+    alone = solve(gmc(2), placed, support=Support(clamp_angle_deg=5.0))
+    assert path.points[-1].centreline.tip_mm == pytest.approx(
+        alone.centreline.tip_mm, abs=1e-9
+    )
+
+
+def test_mirrored_shapes_that_leave_a_straight_rod_are_a_bifurcation() -> None:
+    """Euler's load of a rod whose field points against it is pi^2 / 4 for m B L^2."""
+    euler_mT = flux_mT_of(math.pi**2 / 4.0)
+    there, back = follow_path(
+        BAR, UniformField(flux_mT=1.0, angle_deg=180.0),
+        flux_mT=(0.5 * euler_mT, 1.5 * euler_mT, 0.5 * euler_mT), steps=7,
+    ).folds  # fmt: skip
+    for one, direction in ((there, "rising"), (back, "falling")):
+        assert (one.kind, one.direction) == ("bifurcation", direction)
+        assert one.value == pytest.approx(euler_mT, rel=1e-6)
+        assert one.turning == pytest.approx((0.0, 1.0), abs=1e-12)
+        left, right = one.branches_mm
+        assert left == pytest.approx((right[0], -right[1]), abs=1e-9)
+        assert abs(left[1]) > 1.0
+
+
+@pytest.mark.parametrize("last_mm", [10.0, 11.0, 12.5, 14.0])
+def test_a_magnet_ahead_of_the_rod_is_no_fold(last_mm: float) -> None:
+    ahead = replace(CUBE, axis_angle_deg=180.0)
+    path = follow_path(gmc(2), ahead, gap_mm=(120.0, last_mm, 120.0), steps=30)
+    assert [one.kind for one in path.folds] == ["bifurcation"] * 2
+    there, back = path.folds
+    assert there.value == pytest.approx(back.value, abs=1e-3)
+    for gap_mm, index in ((there.value + 0.01, 0), (there.value - 0.01, 1)):
+        alone = solve(gmc(2), Field(ahead).at_gap(gap_mm))
+        assert alone.morse_index == index
+    (x, y), other = alone.buckled_tips_mm
+    assert other == pytest.approx((x, -y), abs=1e-9)
+    for one in (there, back):
+        assert len(one.branches_mm) == 2
+
+
+def test_outlines_are_where_the_bodies_are() -> None:
+    field = Field(
+        Cuboid(sides_mm=(20.0, 30.0, 10.0), remanence_T=1.3, gap_mm=50.0),
+        Coil(diameter_mm=40.0, current_A=1.0, wire_mm=2.0, centre_mm=(90.0, 0.0, 0.0),
+             axis_angle_deg=0.0),
+        Uniform(flux_mT=3.0),
+    )  # fmt: skip
+    magnet, left, right = outlines_mm(field, 30.0)
+    assert np.ptp(magnet, axis=0) == pytest.approx([20.0, 10.0])
+    assert magnet.max(axis=0) == pytest.approx([40.0, -50.0])
+    assert sorted([left.mean(axis=0)[1], right.mean(axis=0)[1]]) == [-20.0, 20.0]
+    assert left.mean(axis=0)[0] == pytest.approx(90.0)
 
 
 def test_tables_figures_and_animations(tmp_path: Path) -> None:
@@ -275,6 +334,8 @@ def test_the_command_says_points_and_folds(tmp_path: Path) -> None:
     }  # fmt: skip
     assert found["folds"][0]["direction"] == "falling"
     assert CliRunner().invoke(cli.app, options).exit_code == 2
+    idle = [*options, "--gap-mm", "60:50", "--angle-deg", "10"]
+    assert CliRunner().invoke(cli.app, idle).exit_code == 2
     twice = [*options, "--gap-mm", "120:30:120", "--field-mT", "10:20"]
     said = " ".join(CliRunner().invoke(cli.app, twice).output.replace("│", "").split())
     assert "--gap-mm 120:30:120 and --field-mT 10:20 were given" in said

@@ -99,12 +99,26 @@ def test_json_holds_every_step_and_contact():
             (BEND, "--gmc", "2", "--field-mT", "9", "--elevation-deg", "30"),
             "must be within its plane .* one that leaves it: a tube takes it",
         ),
+        ((BEND, "--gmc", "2", "--step-mm", "100"), "step_mm must be from .* to 30 mm"),
         ((BEND, "--gmc", "2", "--friction", "nan"), "friction must be a finite number"),
     ],
 )
 def test_what_cannot_be_is_said_in_a_sentence(given, said):
     with pytest.raises((ConfigError, InputError), match=said):
         run("navigate", *given)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        ("--angle-deg", "30"),
+        ("--elevation-deg", "30"),
+        ("--magnet", "m.toml", "--gap-mm", "60", "--angle-deg", "30"),
+    ],
+)
+def test_a_direction_without_a_field_is_refused(given):
+    with pytest.raises(BadParameter, match="belongs to --field-mT"):
+        run("navigate", BEND, "--gmc", "2", *given)
 
 
 def test_a_field_given_twice_is_refused():
@@ -146,7 +160,7 @@ def test_a_branch_out_of_reach_is_named():
             start={"flux_mT": 1.0},
             every_mm=10.0,
         )
-    with pytest.raises(InputError, match="gate must be one of"):
+    with pytest.raises(InputError, match="gate must be a gate of the lumen"):
         steer(gmc(2), fork, None, weak, gate="middle", start={"flux_mT": 1.0})
 
 

@@ -37,9 +37,13 @@ def test_poses_that_lead_out_of_a_planar_lumen_are_refused_on_the_way():
         navigate(gmc(2), slit, moving(None, [pose, up]), way_mm=5.0, step_mm=2.0)
 
 
-def test_poses_without_an_elevation_stay_uniform_fields():
+def test_what_poses_leave_out_stays_that_of_the_field():
     pose = {"insertion_mm": 0.0, "flux_mT": 10.0}
     assert moving(None, [pose])(3.0) == UniformField(flux_mT=10.0)
+    oblique = Field(Uniform(flux_mT=1.0, angle_deg=40.0, elevation_deg=20.0))
+    assert moving(oblique, [pose])(3.0) == Field(
+        Uniform(flux_mT=10.0, angle_deg=40.0, elevation_deg=20.0)
+    )
 
 
 def test_a_gap_that_no_source_has_is_refused():
