@@ -16,9 +16,9 @@ PLACED = Field(
 
 
 def test_sources_are_named_by_their_kinds() -> None:
-    with pytest.raises(InputError, match="instead received cuboid, coil$"):
+    with pytest.raises(InputError, match=r"instead received cuboid, coil$"):
         pull_in_gaps(gmc(2), PLACED, {"E_MPa": [5.0], "remanence_mT": [20.0]})
-    with pytest.raises(InputError, match="has the sources cuboid, coil$"):
+    with pytest.raises(InputError, match=r"has the sources cuboid, coil$"):
         follow_path(gmc(2), PLACED, flux_mT=(1.0, 2.0))
 
 
