@@ -12,7 +12,7 @@ from ..core.errors import InputError
 from . import vision_camera, vision_points
 from .console import JSON, group, print_json, progress
 from .vision_camera import LINEAR
-from .vision_setting import setting_of, specimen_of
+from .vision_setting import setting_of, specimen_of, squareness
 from .vision_show import tell_frames, tell_ringing
 
 if TYPE_CHECKING:
@@ -69,6 +69,11 @@ def extract(
         None, "--clamp-height-mm",
         help="Height of the clamp's top above the board's plane; where it hides the "
         "root (flag root_hidden).",
+    ),
+    clamp_square_sd_deg: float = typer.Option(
+        None, "--clamp-square-sd-deg",
+        help="How squarely to the clamp's front the rod leaves it: standard deviation; "
+        "default: 0.25.",
     ),
     bare: Path = typer.Option(
         None, "--bare", help="The paper alone, to divide the light out."
@@ -129,6 +134,7 @@ def extract(
         joints_mm=_numbers(joints_mm),
         clamp="none" if free else "auto",
         linear=linear,
+        **squareness(clamp_square_sd_deg),
     )
     rod = specimen_of(specimen, run)
     if rod is not None:

@@ -64,6 +64,21 @@ def setting_of(
     )
 
 
+def squareness(sd_deg: float | None) -> dict[str, float]:
+    """Return what is known of how squarely a rod leaves its clamp.
+
+    Raises
+    ------
+    InputError
+        If a deviation cannot be.
+    """
+    from ..core.checks import positive
+
+    if sd_deg is None:
+        return {}
+    return {"clamp_square_sd_deg": positive(sd_deg, "--clamp-square-sd-deg", "degrees")}
+
+
 def _below_the_camera(rod_height_mm: float, camera_height_mm: float) -> None:
     """Refuse a rod that the camera could not see.
 

@@ -38,8 +38,8 @@ class EndFace:
         Arc length at which the axis meets the line through the crossings, px.
     sigma : float
         Its standard deviation, px.
-    skew : float
-        Slope of the line against the normal, px per px.
+    skew, skew_sd : float
+        Slope of the line against the normal, px per px, and its standard deviation.
     scatter : float
         RMS distance of the crossings from the line, px.
     found : float
@@ -54,6 +54,7 @@ class EndFace:
     scatter: float
     found: float
     rise: float = 0.0
+    skew_sd: float = 0.0
 
 
 def lanes(
@@ -213,10 +214,12 @@ def line_through(across: Array, crossing: Array) -> EndFace | None:
     if found < 0.5 * len(crossing):
         return None
     place, slope, scatter, used = _fit_line(across, crossing)
+    sigma = scatter / math.sqrt(used) + 0.005
     return EndFace(
         s=place,
-        sigma=scatter / math.sqrt(used) + 0.005,
+        sigma=sigma,
         skew=slope,
+        skew_sd=sigma / float(np.std(across)),
         scatter=scatter,
         found=found / len(crossing),
     )

@@ -18,7 +18,6 @@ from ..curve.robust import median
 from ..find.ground import View
 from ..measurement import Measurement
 from .refine import Refined
-from .root import RootPlace
 
 Array = NDArray[np.float64]
 
@@ -59,7 +58,7 @@ def scale_sd(camera: Calibration, rod_height_mm: float) -> float:
 
 
 def with_deviations(
-    result: Measurement, refined: Refined, root: RootPlace, view: LocalView,
+    result: Measurement, refined: Refined, clamped: Array, view: LocalView,
     camera: Calibration, height_mm: float, *, dark: bool,
 ) -> Measurement:  # fmt: skip
     """Return a measurement with its standard deviations.
@@ -68,8 +67,10 @@ def with_deviations(
     ----------
     result : Measurement
         In mm.
-    refined, root
-        The rod in pixels, and where it begins.
+    refined : Refined
+        The rod in pixels.
+    clamped : ndarray, shape (2, 2)
+        Covariance of where it leaves the clamp and of its direction there, px and rad.
     view : LocalView
         How the camera sees its points.
     camera : Calibration
@@ -81,14 +82,17 @@ def with_deviations(
     """
     own = camera.scale_relative_sd
     scale = math.hypot(own if math.isfinite(own) else 0.0, scale_sd(camera, height_mm))
-    unsure = WHOLE * (1.0 + refined.blur) if refined.whole else CUT_OFF * refined.blur
-    white = unsure * refined.saturated
-    clamp = math.hypot(root.sd, white) / float(view.along[0])
+    to_mm = np.array([1.0 / float(view.along[0]), 1.0])
+    clamped = clamped * np.outer(to_mm, to_mm)
+    clamp = math.sqrt(clamped[0, 0])
     rise = float(view.rise_along[-1])
     seen = rise < 0.0 or not dark
     face = rise * (FACE_SEEN if seen else FACE_HIDDEN * rise / float(view.along[-1]))
     tip = math.hypot(
-        refined.tip.sigma, TIP_BLUR * refined.blur, face * result.width_mm, white
+        refined.tip.sigma,
+        TIP_BLUR * refined.blur,
+        face * result.width_mm,
+        white_px(refined),
     ) / float(view.along[-1])
     wall = WIDTH_FACE if dark else PALE_FACE
     width = math.hypot(
@@ -96,15 +100,21 @@ def with_deviations(
         WIDTH_PX if dark else PALE_PX,
         WIDTH_SHADE * median(refined.shaded),
         wall * median(np.abs(view.rise_across)) * result.width_mm,
-        2.0 * white,
+        2.0 * white_px(refined),
     ) / median(view.across)
     return replace(
         result,
         length_sd_mm=math.hypot(clamp, tip, scale * result.length_mm),
         width_sd_mm=math.hypot(width, scale * result.width_mm),
         clamp_sd_mm=clamp,
-        tip_sd_mm=_tip_sd_mm(result, view, clamp, tip, scale, dark=dark),
+        tip_sd_mm=_tip_sd_mm(result, view, clamped, tip, scale, dark=dark),
     )
+
+
+def white_px(refined: Refined) -> float:
+    """Return the doubt of an edge because of white beside it, px."""
+    unsure = WHOLE * (1.0 + refined.blur) if refined.whole else CUT_OFF * refined.blur
+    return unsure * refined.saturated
 
 
 def _widths(refined: Refined) -> float:
@@ -112,14 +122,14 @@ def _widths(refined: Refined) -> float:
 
 
 def _tip_sd_mm(
-    result: Measurement, view: LocalView, clamp: float, tip: float, scale: float, *,
+    result: Measurement, view: LocalView, clamped: Array, tip: float, scale: float, *,
     dark: bool,
 ) -> tuple[float, float]:  # fmt: skip
     """Return the tip's deviations along x and y of the specimen frame.
 
     What side faces shift alike at the root and at the tip moves the frame with the tip.
-    A clamp that is taken too far out by d, on a rod of curvature k there, turns the
-    frame by k d: the tip moves by d (k y - 1) along x, and by -k d x along y.
+    A clamp that is taken too far out by d, and turned too far by f, moves the tip by
+    y f - d along x, and by -x f along y.
     """
     share = SIDE_FACE if dark else PALE_FACE
     faces = share * result.width_mm * view.rise_across / view.along
@@ -127,19 +137,16 @@ def _tip_sd_mm(
     across = np.sqrt(np.maximum(own**2 - faces**2, 0.0))
     beside = math.hypot(across[-1], faces[-1] - faces[0])
     end = math.radians(result.tip_angle_deg)
-    turn = math.radians(result.clamp_angle_sd_deg)
     x, y = result.tip_mm
-    bend = float(result.points["kappa_per_mm"][0])
-    turn = math.sqrt(max(turn**2 - (bend * clamp) ** 2, 0.0))
+    moves = np.array([[-1.0, y], [0.0, -x]])
+    frame = np.diag(moves @ clamped @ moves.T)
     parts = np.array(
         [
             [tip * math.cos(end), tip * math.sin(end)],
             [beside * math.sin(end), beside * math.cos(end)],
-            [clamp * (bend * y - 1.0), clamp * bend * x],
             [0.0, across[0]],
-            [turn * y, turn * x],
             [scale * x, scale * y],
         ]
     )
-    sd_x, sd_y = np.hypot.reduce(parts, axis=0)
+    sd_x, sd_y = np.sqrt(np.sum(parts**2, axis=0) + frame)
     return float(sd_x), float(sd_y)

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 LENGTH_TOLERANCE = 0.02
 
-TURN_MM = 0.12
+TURN_MM = 0.15
 """What the standard deviation of the direction at the clamp may do to the tip."""
 
 SCALE = 5e-4

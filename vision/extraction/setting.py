@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 UNKNOWN_CLAMP_MM = 5.0
 """A clamp of unknown height may rise so far above the rod's axis."""
 
+CLAMP_SQUARE_SD_DEG = 0.25
+"""A front 10 mm wide that is out of square by 0.04 mm, as printed ones may be."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setting:
@@ -48,6 +51,8 @@ class Setting:
     clamp_height_mm : float or None
         Height of the clamp's top above the board's plane. Needed only where the camera
         looks over the clamp so that it hides the root (flag ``root_hidden``).
+    clamp_square_sd_deg : float
+        How squarely to the clamp's front the rod leaves it: standard deviation.
     bare : Photo or None
         The same scene without rod and clamp: its light is divided out.
     guide_px : tuple of tuple of float
@@ -66,6 +71,7 @@ class Setting:
     side_mm: float | None = None
     clamp: Clamp = "auto"
     clamp_height_mm: float | None = None
+    clamp_square_sd_deg: float = CLAMP_SQUARE_SD_DEG
     bare: Photo | None = None
     guide_px: tuple[tuple[float, float], ...] = ()
     linear: bool | None = None

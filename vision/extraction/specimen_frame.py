@@ -21,11 +21,12 @@ from ..curve.robust import median
 from ..edge.state import LostError
 from ..find.ground import View
 from ..measurement import Measurement, Pose
+from .clamp_fit import ClampFit, fit_clamp
 from .deviations import is_dark, side_face, with_deviations
 from .refine import Refined
-from .root import RootPlace, root_place
+from .root import root_place
 from .setting import Setting, arc_mm, silhouette
-from .told_clamp import ToldClamp, surer_direction, told_clamp
+from .told_clamp import told_clamp
 
 Array = NDArray[np.float64]
 
@@ -37,22 +38,6 @@ SAMPLING_PX = 0.002
 SHADE_LEFT = 0.17
 THETA_PX = 0.003
 """Systematic part of a tangent angle, times the width: pixel sampling, as above."""
-SUPPLE, SUPPLE_FREEDOM = 1.2, 5.0
-"""Factor on the fit's own deviation of the direction at the clamp for a curve of so
-many free numbers, and with the root of more: they were chosen by the same points."""
-BENT_BACK, BACK, BENT = 1.5, 0.25, 0.01
-"""Factor for a rod that is bent both ways, the lesser way by this share at least, and
-by so much over its width: no single force makes that, and what is known of moments
-helps less at the root."""
-TURN_SHADE, TURN_WALL, TURN_PALE_WALL = 0.35, 0.14, 0.4
-"""Shares of the shade's pull, and of the side wall that is seen (on a rod that is not
-dark: its light is not known), by which the midline is off all along, with one sign."""
-DRIFT_SHADE, DRIFT_WHITE, DRIFT_REACH = 0.15, 0.03, 1.5
-DRIFT_BENT, DRIFT_PALE_BENT = 0.15, 0.4
-"""Errors that neighbours share over so many widths: of the shade's pull; of the blur
-where the paper is white; and, px, by the angle that a rod turns over its width, for
-then the light on its sides changes."""
-
 POINTS = 121
 """Points of a measured centreline."""
 
@@ -123,7 +108,8 @@ def _calibrated(
     last = refined.tip.s - 0.5 * side_mm * abs(float(ends.rise_along[1]))
     seen = root_place(refined, ends, setting, side_mm)
     told = told_clamp(seen, tag, refined, setting, camera)
-    s = np.linspace(told.root.s, last, 4 * POINTS)
+    clamp = fit_clamp(told, refined, seen_in, setting, camera)
+    s = np.linspace(clamp.s, last, 4 * POINTS)
     points, _ = curve.at(s)
     s_mm = arc_mm(camera.to_mm(points, height_mm=setting.axis_height_mm))
     if not np.isfinite(s_mm[-1]):
@@ -133,11 +119,11 @@ def _calibrated(
         )
     even = np.linspace(0.0, s_mm[-1], POINTS)
     at = np.interp(even, s_mm, s)
-    return _in_frame(refined, told, seen_in, setting, even, at, camera)
+    return _in_frame(refined, clamp, seen_in, setting, even, at, camera)
 
 
 def _in_frame(
-    refined: Refined, told: ToldClamp, seen_in: View, setting: Setting, s_mm: Array,
+    refined: Refined, clamp: ClampFit, seen_in: View, setting: Setting, s_mm: Array,
     s: Array, camera: Calibration,
 ) -> Measurement:  # fmt: skip
     """Return the measurement at these arc lengths, in mm and px."""
@@ -145,13 +131,9 @@ def _in_frame(
     grid = fit.curve
     points, theta = grid.at(s)
     view = setting.view(camera, points, theta)
-    heading, root = view.heading, told.root
+    heading, angle_deg = view.heading, clamp.angle_deg
     across = silhouette(view)
     wall = view.rise_across * np.interp(s, grid.s, refined.width) / across
-    own_sd_deg = _clamp_sd_deg(refined, np.interp(grid.s, s, wall), root, seen_in)
-    angle_deg, sd_deg, flags = surer_direction(
-        told, float(np.degrees(heading[0])), own_sd_deg
-    )
     pose = Pose(
         x_mm=float(view.x_mm[0]), y_mm=float(view.y_mm[0]),
         angle_deg=angle_deg, height_mm=setting.axis_height_mm,
@@ -181,43 +163,22 @@ def _in_frame(
         tip_mm=(float(own[-1, 0]), float(own[-1, 1])),
         tip_angle_deg=float(np.degrees(heading[-1])) - angle_deg,
         width_mm=median(table["width_mm"][table["good"] > 0.5]),
-        clamp_angle_sd_deg=sd_deg,
+        clamp_angle_sd_deg=clamp.angle_sd_deg,
         length_px=float(s[-1] - s[0]),
         width_px=refined.typical_width,
         blur_px=refined.blur,
         clamp_px=(float(points[0, 0]), float(points[0, 1])),
         tip_px=(float(points[-1, 0]), float(points[-1, 1])),
         pose=pose,
-        flags=(*flags, *(("clamp_lines_differ",) if root.lines_differ else ())),
+        flags=clamp.flags,
     )
     height_mm = setting.axis_height_mm
     return with_deviations(
-        result, refined, root, view, camera, height_mm, dark=is_dark(seen_in)
+        result,
+        refined,
+        clamp.covariance,
+        view,
+        camera,
+        height_mm,
+        dark=is_dark(seen_in),
     )
-
-
-def _clamp_sd_deg(
-    refined: Refined, wall: Array, root: RootPlace, seen_in: View
-) -> float:
-    """Return the standard deviation of the direction at the clamp.
-
-    `wall` is how wide the side wall is seen, px, positive on the left.
-    """
-    fit, width = refined.fit, float(refined.width[0])
-    facing, bent = (
-        (TURN_WALL, DRIFT_BENT) if is_dark(seen_in)
-        else (TURN_PALE_WALL, DRIFT_PALE_BENT)
-    )  # fmt: skip
-    drift = np.hypot(bent * fit.curve.kappa * width, DRIFT_SHADE * refined.shaded)
-    white = DRIFT_WHITE * refined.saturated * refined.blur
-    both = sorted((fit.curve.kappa.max(), -fit.curve.kappa.min()))
-    free = BENT_BACK if both[0] > max(BACK * both[1], BENT / width) else 1.0
-    supple = SUPPLE * math.sqrt(fit.freedom / SUPPLE_FREEDOM)
-    parts = (
-        free * supple * fit.sigma_theta[0],
-        free * fit.turned(np.hypot(drift, white), DRIFT_REACH * width),
-        TURN_SHADE * fit.lever @ refined.shaded,
-        facing * fit.lever @ wall,
-        root.sd * fit.curve.kappa[0],
-    )
-    return math.degrees(math.hypot(*parts))

@@ -1,0 +1,98 @@
+"""Lines, rod and front tell the clamp's place and direction together."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from magbend.vision import Pose, as_photo, extract
+from magbend.vision.extraction.clamp_fit import APART, joint
+from magbend.vision.synthetic import (
+    Block,
+    Mark,
+    Scene,
+    curve,
+    render_scene,
+    scene_camera,
+)
+
+NO_FRONT = 0.0, np.inf
+ANGLE = 4.0
+CAMERA = scene_camera(
+    size_px=(900, 720), focal_px=1000.0, height_mm=56.0, tilt_deg=11.0,
+    tilt_direction_deg=20.0, target_mm=(0.0, 0.0),
+)  # fmt: skip
+
+
+def test_without_a_front_the_place_turns_the_direction_with_it():
+    shift, covariance, apart = joint(0.5, 1e-3, 4e-3, *NO_FRONT)
+    assert shift.tolist() == [0.0, 0.0]
+    assert apart == 0.0
+    turned = 4e-3 * 0.5
+    assert covariance[0, 0] == pytest.approx(0.25)
+    assert covariance[0, 1] == pytest.approx(4e-3 * 0.25)
+    assert covariance[1, 1] == pytest.approx(turned**2 + 1e-6)
+
+
+def test_two_readings_of_a_straight_rod_are_weighed_by_their_squares():
+    shift, covariance, _ = joint(0.1, 2e-3, 0.0, 1e-3, 1e-3)
+    assert shift == pytest.approx([0.0, 0.8e-3])
+    assert covariance[1, 1] == pytest.approx(1.0 / (1.0 / 4e-6 + 1.0 / 1e-6))
+
+
+def test_where_a_bent_rod_looks_tells_where_it_leaves_its_clamp():
+    """A place in doubt by 5 px, and a direction known to what the rod turns on 1 px."""
+    bend, true = 4e-3, 3.0
+    shift, covariance, _ = joint(5.0, 1e-4, bend, bend * true, bend)
+    assert shift[0] == pytest.approx(true, rel=0.1)
+    assert shift[1] == pytest.approx(bend * true, rel=0.1)
+    assert np.sqrt(covariance[0, 0]) < 1.05
+
+
+@pytest.mark.parametrize(("rod_sd", "believed"), [(1e-3, "rod"), (2e-2, "front")])
+def test_what_disagrees_is_not_averaged_away(rod_sd, believed):
+    turn, turn_sd = 0.1, 5e-3
+    shift, covariance, apart = joint(0.05, rod_sd, 0.0, turn, turn_sd)
+    assert apart > APART
+    assert shift[1] == pytest.approx(
+        turn if believed == "front" else 0.0, abs=0.1 * turn
+    )
+    agreed = joint(0.05, rod_sd, 0.0, 0.0, turn_sd)[1]
+    assert covariance[1, 1] > 1.5 * agreed[1, 1]
+
+
+def photographed(shape, *, skew_deg=0.0):
+    """Photograph a rod by a near, tilted lens; the clamp's foot may look askew."""
+    pose = Pose(x_mm=-12.0, y_mm=-6.0, angle_deg=ANGLE, height_mm=1.4)
+    corners = np.array([[-3.0, -5.0], [0.5, -5.0], [0.5, 5.0], [-3.0, 5.0]])
+    askew = Pose(x_mm=0.0, y_mm=0.0, angle_deg=skew_deg).to_board(corners)
+    foot = Mark(outline_mm=pose.to_board(askew), colour=(0.3, 0.3, 0.3))
+    scene = Scene(
+        clamp=Block(pose=pose, width_mm=10.0, height_mm=4.0), centreline=shape,
+        marks=(foot,) if skew_deg else (), dust=0,
+    )  # fmt: skip
+    return as_photo(render_scene(scene, CAMERA, np.random.default_rng(5)))
+
+
+def measured(photo, **known):
+    found = extract(photo, CAMERA, rod_height_mm=1.4, clamp_height_mm=4.0, **known)
+    assert found.ok, found.reason
+    return found, abs(found.pose.angle_deg - ANGLE)
+
+
+def test_a_square_front_steadies_the_direction_of_a_rod_that_is_bent_both_ways():
+    photo = photographed(curve("s", angle_deg=45.0, length_mm=20.0))
+    alone, off_alone = measured(photo, clamp_square_sd_deg=1e3)
+    found, off = measured(photo)
+    assert "direction_doubtful" in alone.flags
+    assert "direction_doubtful" not in found.flags
+    assert off < 0.3 * off_alone
+    assert found.clamp_angle_sd_deg < 0.5 * alone.clamp_angle_sd_deg
+    assert off < 2.0 * found.clamp_angle_sd_deg
+
+
+def test_a_front_that_is_not_square_is_named_and_not_believed():
+    photo = photographed(curve("straight", length_mm=20.0), skew_deg=6.0)
+    found, off = measured(photo)
+    assert "clamp_lines_differ" in found.flags
+    assert off < 3.0 * found.clamp_angle_sd_deg < 1.0
