@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 
 from magbend.vision.camera.calibration import specimen_to_px
 from magbend.vision.measurement import Pose
 from magbend.vision.picture.photo import as_photo
+from magbend.vision.picture.raster import coverage
 from magbend.vision.synthetic import (
     BLACK,
     BLUE,
@@ -116,3 +118,37 @@ def test_gloss_and_other_blocks_show():
     assert (glossy - plain).max() > 60
     blocked = photograph(replace(scene, blocks=(magnet,))).astype(int)
     assert (plain - blocked).max() > 60
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.2, 5.0])
+def test_a_pixel_shows_as_much_paper_as_the_block_leaves(tilt):
+    """Walls and top together cover a pixel once, however little of a wall is seen."""
+    camera = scene_camera(size_px=(800, 600), focal_px=3400.0, tilt_deg=tilt)
+    pose = Pose(x_mm=0.0, y_mm=0.0, angle_deg=11.0)
+    block = Block(pose=pose, width_mm=6.0, length_mm=9.0, height_mm=3.0)
+    corners = pose.to_board(np.array([[0, 3], [0, -3], [-9, -3], [-9, 3]], float))
+    size = camera.image_size_px
+    top = coverage(camera.to_px(corners, height_mm=3.0), *size)
+    walls = drawing.block_walls(block, camera)
+    covered = 1.0 - (1.0 - walls) * (1.0 - top)
+    pixels = [camera.to_px(corners, height_mm=height) for height in (0.0, 3.0)]
+    hull = cv2.convexHull(np.vstack(pixels).astype(np.float32))[:, 0]
+    whole = coverage(hull.astype(np.float64), *size)
+    np.testing.assert_allclose(covered, whole, atol=2e-3)
+
+
+def test_a_lens_bends_the_foot_of_a_block_as_it_bends_a_line_there():
+    camera = scene_camera(
+        size_px=(900, 700), focal_px=1200.0, height_mm=60.0, target_mm=(0.0, 0.0),
+        distortion=(-0.12, 0.0, 0.0, 0.0, 0.0),
+    )  # fmt: skip
+    pose = Pose(x_mm=13.0, y_mm=0.0, angle_deg=180.0)
+    foot = pose.to_board(np.column_stack([np.zeros(81), np.linspace(-5.0, 5.0, 81)]))
+    x, y = camera.to_px(foot)[:: -1 if camera.to_px(foot)[0, 1] > 350 else 1].T
+    assert np.ptp(x - np.linspace(x[0], x[-1], len(x))) > 0.15
+    walls = drawing.block_walls(Block(pose=pose, width_mm=12.0, height_mm=3.0), camera)
+    for row in range(int(y[0]) + 1, int(y[-1])):
+        begins = float(np.interp(row, y, x))
+        first, last = int(begins) - 4, int(begins) + 4
+        covered = walls[row, first : last + 1].sum()
+        assert abs(last + 0.5 - covered - begins) < 0.03

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -36,24 +37,37 @@ def _block_corners(block: Block) -> Array:
 
 def block_walls(block: Block, camera: Calibration) -> Picture:
     """Return where the sides of a block are seen beside its top."""
-    corners = _block_corners(block)
-    pixels = np.concatenate(
-        [
-            camera.to_px(subdivide(corners), height_mm=height)
-            for height in (0.0, block.height_mm)
-        ]
-    )
     size = camera.image_size_px
+    corners = _block_corners(block)
     top = camera.to_px(subdivide(corners), height_mm=block.height_mm)
-    return _beside(coverage(_hull(pixels), *size), coverage(top, *size))
+    whole = _box_outline(corners, block.height_mm, camera)
+    return _beside(coverage(whole, *size), coverage(top, *size))
+
+
+def _box_outline(corners: Array, height_mm: float, camera: Calibration) -> Array:
+    """Return the outline of an upright box, px: without the lens it would be convex."""
+    pinhole = replace(camera, distortion=(0.0, 0.0, 0.0, 0.0, 0.0))
+    levels = (0.0, height_mm)
+    ends = np.vstack([np.insert(corners, 2, level, axis=1) for level in levels])
+    seen = [pinhole.to_px(corners, height_mm=level) for level in levels]
+    hull = cv2.convexHull(np.vstack(seen).astype(np.float32), returnPoints=False)
+    edges = subdivide(ends[hull[:, 0]])
+    # What lies between the levels is an upright edge: short, and straight enough.
+    edges = edges[np.isin(edges[:, 2], levels)]
+    pixels = np.empty((len(edges), 2))
+    for level in levels:
+        at = edges[:, 2] == level
+        pixels[at] = camera.to_px(edges[at, :2], height_mm=level)
+    return pixels
 
 
 def _beside(whole: Picture, top: Picture) -> Picture:
-    """Return where walls must be laid before the top: not where both end together.
+    """Return how much of a wall to lay where a top that covers the rest is laid later.
 
-    There each would cover its share of the pixel, and the edge move out by a sixth.
+    Of a pixel that both share, that is left of the ground which the whole leaves.
     """
-    return np.where(whole > top + 1e-3, whole, np.float32(0.0))
+    left = np.maximum(1.0 - top, np.float32(1e-6))
+    return np.asarray(np.where(whole > top, (whole - top) / left, np.float32(0.0)))
 
 
 def draw_top(picture: Picture, block: Block, camera: Calibration) -> None:
@@ -94,7 +108,7 @@ def block_shadow(block: Block, camera: Calibration, light: SceneLight) -> Pictur
     """Return where a block keeps the lamp's light from the paper, from 0 to 1."""
     corners = _block_corners(block)
     shifted = corners + _shadow_shift(light, block.height_mm)
-    outline = _hull(camera.to_px(subdivide(_hull(np.concatenate([corners, shifted])))))
+    outline = camera.to_px(subdivide(_hull(np.concatenate([corners, shifted]))))
     sharp = coverage(outline, *camera.image_size_px)
     return _soften(sharp, light.softness * block.height_mm / _scale(camera))
 
@@ -258,7 +272,7 @@ def subdivide(outline: Array, pieces: int = 24) -> Array:
     t = np.arange(pieces)[None, :, None] / pieces
     following = np.roll(outline, -1, axis=0)
     points = outline[:, None] + t * (following - outline)[:, None]
-    return np.asarray(points.reshape(-1, 2))
+    return np.asarray(points.reshape(-1, outline.shape[1]))
 
 
 def _hull(points: Array) -> Array:
