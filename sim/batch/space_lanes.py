@@ -2,9 +2,10 @@
 
 Dimensionless as `spatial.march`; `batch.space_room` has the equations. The unknowns are
 the tip's turn and shift. Newton starts from the unloaded rod, with a matrix of its own
-until corrections are small. A last march with steps half as long corrects the result;
-its own error is 2^-6 of what it changes, and so is what a matrix of three digits leaves
-of that: the bound given takes 2^-3.
+until corrections are small. A last march with steps half as long corrects the result,
+and by the order of the steps tells what it leaves: 1/63 of its correction, which is
+added. The bound given is three times as much, and what a correction by the matrix kept
+leaves at the rate of the ones before; more where it is large.
 
 A rod leaves this fast lane (its outcome is `HARD`) when it needs more than `MOST_STEPS`
 steps in a section, is before more than one cuboid, comes near to it or is very far from
@@ -51,15 +52,14 @@ from .space_room import (
     MISS,
     OPTIONS,
     PACK,
+    RATE,
     SIZE,
     SURE,
     TIP,
     TRACE,
-    G,
-    Y,
 )  # fmt: skip
 
-STEP = 0.5
+STEP = 0.8
 """What one step takes of h sqrt(P / EI), and of the turn of the unloaded rod."""
 MOST_STEPS = 6
 """Most steps in a section."""
@@ -73,10 +73,12 @@ SHRINK = 0.5
 """Largest ratio of a correction to the one before."""
 CHORD = 4e-2
 """Correction after which the matrix is kept."""
-CLOSE = 3e-3
+CLOSE = 2e-3
 """Correction after which a matrix of the pose before leaves a millionth."""
 COARSE = 1e-4
 """Largest correction by steps half as long."""
+LEFT = 1.0 / 63.0
+"""What those steps leave of that correction, by their order."""
 FARTHEST = 40.0
 """Distance, in half sides, from which too many digits of a cuboid's gradient cancel."""
 ROUNDING = 1e-13
@@ -92,6 +94,7 @@ def _judge(rows, w, outcome):  # type: ignore[no-untyped-def]
             outcome[rows[i]] = HARD
         if outcome[rows[i]] != HARD:
             largest = max(largest, size)
+        w[RATE + i] = SHRINK * size / w[BEFORE + i]
         w[BEFORE + i] = max(SHRINK * size, CLOSE)
     return largest
 
@@ -159,8 +162,7 @@ def _frame(field, Q, at, own):  # type: ignore[no-untyped-def]
 def _fill(rows, rods, fields, Rc, own, w):  # type: ignore[no-untyped-def]
     """Take up to LANES rods into the lanes; the last one also into those left over."""
     Q, at, D, r = np.empty((3, 3)), np.empty(3), np.empty((3, 3)), np.empty(3)
-    for i in range(G, Y):
-        w[i] = 0.0
+    w[:] = 0.0
     for i in range(LANES):
         row = rows[min(i, rows.shape[0] - 1)]
         field, rod = fields[row], rods[row]
@@ -276,12 +278,16 @@ def _solve_block(rows, rods, fields, Rc, steps, loads, own, b, w, out, outcome):
             return
     march(sections, 2 * steps, 0, tilted, along, own, b, w)
     correct(w)
+    for i in range(6 * LANES):
+        w[MISS + i] *= LEFT
+    change = w[SIZE : SIZE + LANES].copy()
+    move(w)
     for i in range(rows.shape[0]):
-        row, change = rows[i], w[SIZE + i]
-        if not change < COARSE:
+        row = rows[i]
+        if not change[i] < COARSE:
             outcome[row] = HARD
         _leave(fields[row], i, w, out[row])
-        out[row, 6] = 0.2 * change + ROUNDING
+        out[row, 6] = change[i] * (0.05 + w[RATE + i] + 200.0 * change[i]) + ROUNDING
 
 
 @njit(**OPTIONS)

@@ -17,7 +17,7 @@ from .space_room import (
     Y,
     Z,
 )  # fmt: skip
-from .space_steps import column_steps, state_step
+from .space_steps import state_step
 
 
 @njit(**OPTIONS)
@@ -78,10 +78,9 @@ def march(sections, steps, columns, tilted, along, own, b, w):  # type: ignore[n
             w[SECTION + i] = w[at + i]
         for i in range(LANES):
             w[SECTION + H * LANES + i] /= steps
-        for _ in range(steps):
+        for step in range(steps):
             state_step(columns, tilted, along, w)
-            if columns > 0:
-                column_steps(columns, tilted, w)
+            if columns > 0 and (step % 2 == 1 or step + 1 == steps):
                 matrix(w)
                 test(columns, w)
         if k + 1 < sections:

@@ -39,11 +39,16 @@ BENT = G + 5 * LANES
 Y = BENT + 5 * LANES
 LOOK = Y + STATE * LANES
 SLOPE = LOOK + STATE * LANES
-SIGHT = SLOPE + STAGES * STATE * LANES
-Z = SIGHT + LOOKS * SEEN * LANES
+FOUND = SLOPE + STAGES * STATE * LANES
+"""The slope of a stage, before it is put away: the loops that do the work find and
+leave all at constant distances."""
+SIGHT = FOUND + STATE * LANES
+KEPT = SIGHT + SEEN * LANES
+Z = KEPT + SEEN * LANES
 Z_LOOK = Z + 6 * COLUMN * LANES
-Z_SLOPE = Z_LOOK + COLUMN * LANES
-MATRIX = Z_SLOPE + LOOKS * COLUMN * LANES
+Z_FOUND = Z_LOOK + COLUMN * LANES
+Z_SLOPE = Z_FOUND + COLUMN * LANES
+MATRIX = Z_SLOPE + 6 * LOOKS * COLUMN * LANES
 """Newton's matrix, row by row, and then its factors."""
 TEST = MATRIX + 36 * LANES
 LEVER = TEST + 36 * LANES
@@ -58,7 +63,9 @@ SURE = LAST + 12 * LANES
 TRACE = SURE + LANES
 SIZE = TRACE + LANES
 BEFORE = SIZE + LANES
-PACK = BEFORE + LANES
+RATE = BEFORE + LANES
+"""The largest correction allowed, and what the last one was of the one before."""
+PACK = RATE + LANES
 """Then the numbers of all sections."""
 POSITIVE = 16383
 """Mask above all offsets that a loop computes: none is negative."""

@@ -16,6 +16,8 @@ from .space_field import bends, gradients
 from .space_room import (
     BENT,
     COLUMN,
+    FOUND,
+    KEPT,
     LANES,
     LOOK,
     OPTIONS,
@@ -25,6 +27,7 @@ from .space_room import (
     SLOPE,
     STAGES,
     STATE,
+    Z_FOUND,
     Z_LOOK,
     Z_SLOPE,
     G,
@@ -32,14 +35,15 @@ from .space_room import (
     Z,
 )
 
-_SEES = np.array([0, -1, 2, 1, -1, -1, 3])
-"""Which look of the columns each stage is."""
+_SEEN_AT = (0, 2, 3, 6)
+"""The stages that the columns look at."""
+_KUTTA = np.array([[0, 0, 0], [1 / 3, 0, 0], [-1 / 3, 1, 0], [1, -1, 1]])
+"""Weights of the slopes of a column at each look."""
 
 
 @njit(**OPTIONS)
-def _state_slope(k, w):  # type: ignore[no-untyped-def]
-    """Write h dy/dsigma of stage k."""
-    f = (SLOPE + STATE * LANES * k) & POSITIVE
+def _state_slope(w):  # type: ignore[no-untyped-def]
+    """Write h dy/dsigma where the lanes look."""
     for i in range(LANES):
         h = w[H * LANES + i]
         y = LOOK + i
@@ -61,7 +65,7 @@ def _state_slope(k, w):  # type: ignore[no-untyped-def]
         xz, yy = w[G + 2 * LANES + i], w[G + 3 * LANES + i]
         yz = w[G + 4 * LANES + i]
         zz = -(xx + yy)
-        j = f + i
+        j = FOUND + i
         w[j] = o2 * cx - o3 * bx
         w[j + LANES] = o2 * cy - o3 * by
         w[j + 2 * LANES] = o2 * cz - o3 * bz
@@ -89,9 +93,8 @@ def _state_slope(k, w):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _see(k, w):  # type: ignore[no-untyped-def]
-    """Leave for look k of the columns what they need of the state."""
-    f = (SIGHT + SEEN * LANES * k) & POSITIVE
+def _see(w):  # type: ignore[no-untyped-def]
+    """Write what the columns need of the state where the lanes look."""
     for i in range(LANES):
         h = w[H * LANES + i]
         y = LOOK + i
@@ -101,7 +104,7 @@ def _see(k, w):  # type: ignore[no-untyped-def]
         c1, c2 = h * w[C1 * LANES + i], h * w[C2 * LANES + i]
         c3 = h * w[C3 * LANES + i]
         mu1, mu2 = h * w[MU1 * LANES + i], h * w[MU2 * LANES + i]
-        j = f + i
+        j = SIGHT + i
         w[j] = h * cx
         w[j + LANES] = h * cy
         w[j + 2 * LANES] = h * cz
@@ -136,47 +139,43 @@ def _see(k, w):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _look_ahead(k, w):  # type: ignore[no-untyped-def]
+def _look_ahead(k, to, w):  # type: ignore[no-untyped-def]
     """Set the state at which stage k looks, by the slopes so far (7: at the end)."""
-    for i in range(STATE * LANES):
-        w[LOOK + i] = w[Y + i]
-    for j in range(k):
-        a = _A[k, j]
-        if a == 0.0:
-            continue
-        f = (SLOPE + STATE * LANES * j) & POSITIVE
+    to &= POSITIVE
+    row, f = STATE * LANES, SLOPE
+    if k == 0:
         for i in range(STATE * LANES):
-            w[LOOK + i] += a * w[f + i]
+            w[to + i] = w[Y + i]
+    elif k <= 2:
+        a = _A[k, k - 1]
+        f = (SLOPE + row * (k - 1)) & POSITIVE
+        for i in range(STATE * LANES):
+            w[to + i] = w[Y + i] + a * w[f + i]
+    elif k <= 4:
+        a, b, c, d = _A[k, 0], _A[k, 1], _A[k, 2], _A[k, 3]
+        for i in range(STATE * LANES):
+            f = SLOPE + i
+            w[to + i] = (
+                w[Y + i] + a * w[f] + b * w[f + row] + c * w[f + 2 * row]
+                + d * w[f + 3 * row]
+            )  # fmt: skip
+    else:
+        a, b, c, d = _A[k, 0], _A[k, 1], _A[k, 2], _A[k, 3]
+        e, g, h = _A[k, 4], _A[k, 5], _A[k, 6]
+        for i in range(STATE * LANES):
+            f = SLOPE + i
+            w[to + i] = (
+                w[Y + i] + a * w[f] + b * w[f + row] + c * w[f + 2 * row]
+                + d * w[f + 3 * row] + e * w[f + 4 * row] + g * w[f + 5 * row]
+                + h * w[f + 6 * row]
+            )  # fmt: skip
 
 
 @njit(**OPTIONS)
-def state_step(columns, tilted, along, w):  # type: ignore[no-untyped-def]
-    """Advance the states by a step.
-
-    Leaves what `column_steps` need if there are `columns`. Some rods are `tilted`, and
-    the field is not the same all `along` them.
-    """
-    for k in range(STAGES):
-        _look_ahead(k, w)
-        if tilted and along:
-            gradients(w)
-        _state_slope(k, w)
-        if columns > 0 and _SEES[k] >= 0:
-            if tilted and along:
-                bends(w)
-            _see(_SEES[k], w)
-    _look_ahead(STAGES, w)
-    for i in range(STATE * LANES):
-        w[Y + i] = w[LOOK + i]
-
-
-@njit(**OPTIONS)
-def _column_slope(k, w):  # type: ignore[no-untyped-def]
-    """Write h dz/dsigma at look k of a column, but for what acts across the rod."""
-    f = (Z_SLOPE + COLUMN * LANES * k) & POSITIVE
-    s = (SIGHT + SEEN * LANES * k) & POSITIVE
+def _column_slope(w):  # type: ignore[no-untyped-def]
+    """Write h dz/dsigma of a column, but for what acts across the rod."""
     for i in range(LANES):
-        z, c, j = Z_LOOK + i, s + i, f + i
+        z, c, j = Z_LOOK + i, SIGHT + i, Z_FOUND + i
         tx, ty, tz = w[z], w[z + LANES], w[z + 2 * LANES]
         vx, vy, vz = w[z + 9 * LANES], w[z + 10 * LANES], w[z + 11 * LANES]
         cx, cy, cz = w[c], w[c + LANES], w[c + 2 * LANES]
@@ -202,12 +201,10 @@ def _column_slope(k, w):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _column_across(k, w):  # type: ignore[no-untyped-def]
+def _column_across(w):  # type: ignore[no-untyped-def]
     """Add what the transverse magnetisation does."""
-    f = (Z_SLOPE + COLUMN * LANES * k) & POSITIVE
-    s = (SIGHT + SEEN * LANES * k) & POSITIVE
     for i in range(LANES):
-        z, c, j = Z_LOOK + i, s + i, f + i
+        z, c, j = Z_LOOK + i, SIGHT + i, Z_FOUND + i
         tx, ty, tz = w[z], w[z + LANES], w[z + 2 * LANES]
         rx, ry, rz = w[z + 6 * LANES], w[z + 7 * LANES], w[z + 8 * LANES]
         px, py, pz = w[c + 15 * LANES], w[c + 16 * LANES], w[c + 17 * LANES]
@@ -234,37 +231,72 @@ def _column_across(k, w):  # type: ignore[no-untyped-def]
 
 
 @njit(**OPTIONS)
-def _column_look(column, k, w):  # type: ignore[no-untyped-def]
-    """Set a column at which look k looks (4: the step's end)."""
+def _column_ahead(column, k, w):  # type: ignore[no-untyped-def]
+    """Set a column as look k sees it."""
     z = (Z + COLUMN * LANES * column) & POSITIVE
-    f, g, e = Z_SLOPE, Z_SLOPE + COLUMN * LANES, Z_SLOPE + 2 * COLUMN * LANES
-    if k == 0:
-        for i in range(COLUMN * LANES):
-            w[Z_LOOK + i] = w[z + i]
-    elif k == 1:
-        for i in range(COLUMN * LANES):
-            w[Z_LOOK + i] = w[z + i] + w[f + i] / 3.0
-    elif k == 2:
-        for i in range(COLUMN * LANES):
-            w[Z_LOOK + i] = w[z + i] + w[g + i] - w[f + i] / 3.0
-    else:
-        for i in range(COLUMN * LANES):
-            w[Z_LOOK + i] = w[z + i] + w[f + i] - w[g + i] + w[e + i]
+    g = (Z_SLOPE + COLUMN * LANES * column) & POSITIVE
+    a, b, c = _KUTTA[k, 0], _KUTTA[k, 1], _KUTTA[k, 2]
+    row = 6 * COLUMN * LANES
+    for i in range(COLUMN * LANES):
+        f = g + i
+        w[Z_LOOK + i] = w[z + i] + a * w[f] + b * w[f + row] + c * w[f + 2 * row]
 
 
 @njit(**OPTIONS)
-def column_steps(columns, tilted, w):  # type: ignore[no-untyped-def]
-    """Advance the first `columns` columns by the step that `state_step` took."""
+def _look_of_columns(columns, k, tilted, w):  # type: ignore[no-untyped-def]
+    """Write the slopes of the columns at look k."""
     for column in range(columns):
-        for k in range(4):
-            _column_look(column, k, w)
-            _column_slope(k, w)
-            if tilted:
-                _column_across(k, w)
-        z = (Z + COLUMN * LANES * column) & POSITIVE
-        row = COLUMN * LANES
-        for i in range(COLUMN * LANES):
-            f = Z_SLOPE + i
-            w[z + i] += 0.125 * (
-                w[f] + 3.0 * (w[f + row] + w[f + 2 * row]) + w[f + 3 * row]
-            )
+        _column_ahead(column, k, w)
+        _column_slope(w)
+        if tilted:
+            _column_across(w)
+        _copy(COLUMN, Z_FOUND, Z_SLOPE + COLUMN * LANES * (6 * k + column), w)
+
+
+@njit(**OPTIONS)
+def _end_of_columns(columns, w):  # type: ignore[no-untyped-def]
+    """Advance the columns by their slopes at all looks."""
+    row = 6 * COLUMN * LANES
+    for i in range(columns * COLUMN * LANES):
+        f = Z_SLOPE + i
+        w[Z + i] += 0.125 * (
+            w[f] + 3.0 * (w[f + row] + w[f + 2 * row]) + w[f + 3 * row]
+        )
+
+
+@njit(**OPTIONS)
+def _copy(rows, here, there, w):  # type: ignore[no-untyped-def]
+    """Copy rows."""
+    here &= POSITIVE
+    there &= POSITIVE
+    for i in range(rows * LANES):
+        w[there + i] = w[here + i]
+
+
+@njit(**OPTIONS)
+def state_step(columns, tilted, along, w):  # type: ignore[no-untyped-def]
+    """Advance the states, and the first `columns` columns, by a step.
+
+    Some rods are `tilted`, and the field is not the same all `along` them.
+    """
+    for k in range(STAGES):
+        _look_ahead(k, LOOK, w)
+        if tilted and along:
+            gradients(w)
+        _state_slope(w)
+        _copy(STATE, FOUND, SLOPE + STATE * LANES * k, w)
+        if columns > 0 and k in _SEEN_AT:
+            if tilted and along:
+                bends(w)
+            _see(w)
+            if k == 2:  # 2/3 comes before 1/3
+                _copy(SEEN, SIGHT, KEPT, w)
+                continue
+            look = 0 if k == 0 else 1 if k == 3 else 3
+            _look_of_columns(columns, look, tilted, w)
+            if k == 3:
+                _copy(SEEN, KEPT, SIGHT, w)
+                _look_of_columns(columns, 2, tilted, w)
+    _look_ahead(STAGES, Y, w)
+    if columns > 0:
+        _end_of_columns(columns, w)
