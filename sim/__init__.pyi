@@ -179,7 +179,13 @@ from .sources import (
     Uniform as Uniform,
 )
 from .sources import (
+    field_of_tables as field_of_tables,
+)
+from .sources import (
     read_field as read_field,
+)
+from .sources import (
+    tables_of as tables_of,
 )
 from .spatial.rod import (
     SpatialRod as SpatialRod,

@@ -9,6 +9,8 @@ the box in which rods go. It may be plain Python: it is sampled once, and slow o
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -26,7 +28,7 @@ from .magnet.map import FieldMap, read_map, sampled_map
 
 __all__ = [
     "Coil", "Cuboid", "Cylinder", "Dipole", "FieldMap", "Gradient", "Uniform",
-    "read_field", "sampled_map",
+    "field_of_tables", "read_field", "sampled_map", "tables_of",
 ]  # fmt: skip
 
 GROUP = "magbend.sources"
@@ -95,7 +97,9 @@ class _Gradient(FileModel):
 
 class _Map(FileModel):
     kind: Literal["map"]
-    file: str
+    file: str | None = None
+    points_mm: list[Vector] | None = None
+    flux_mT: list[Vector] | None = None
     tolerance_mT: PositiveFloat | None = None
 
 
@@ -111,7 +115,7 @@ _KINDS: dict[str, tuple[type[FileModel], Any]] = {
     "coil": (_Coil, Coil),
     "uniform": (_Uniform, Uniform),
     "gradient": (_Gradient, Gradient),
-    "map": (_Map, None),
+    "map": (_Map, FieldMap),
 }
 
 
@@ -133,24 +137,73 @@ def read_field(path: Path) -> Field:
     text = read_text(path)
     if "[[source]]" not in text and '"source"' not in text:
         return Field(cuboid_of(read_magnet(path)))
-    tables = read_toml(path, _FieldFile).source
-    return Field([_source(path, i, table) for i, table in enumerate(tables)])
+    tables = [table.model_dump() for table in read_toml(path, _FieldFile).source]
+    return field_of_tables(tables, str(path), path.parent)
 
 
-def _source(path: Path, number: int, table: _Other) -> Source:
-    keys = table.model_dump()
-    where = f"{path}: source {number} ({table.kind})"
-    model, build = _KINDS.get(table.kind, (FileModel, None))
+def field_of_tables(
+    tables: Sequence[Mapping[str, Any]], where: str, folder: Path
+) -> Field:
+    """Return the field of ``[[source]]`` tables.
+
+    Parameters
+    ----------
+    tables : sequence of mapping
+        One a source, with its `kind`.
+    where : str
+        The file they stand in, for messages.
+    folder : Path
+        Where the files of maps are.
+
+    Raises
+    ------
+    ConfigError
+        One sentence with file and key.
+    """
+    return Field(
+        _source(f"{where}: source {i}", folder, dict(table))
+        for i, table in enumerate(tables)
+    )
+
+
+def tables_of(field: Field) -> list[dict[str, Any]]:
+    """Return a field as ``[[source]]`` tables that need no other file.
+
+    What JSON holds: `field_of_tables` makes the same field of them. A map, and what a
+    kind of another package was sampled to, keeps its readings.
+    """
+    return [
+        {"kind": source.kind}
+        | {
+            one.name: _listed(value)
+            for one in fields(source)  # type: ignore[arg-type]
+            if one.init and (value := getattr(source, one.name)) is not None
+        }
+        for source in field.sources
+    ]
+
+
+def _listed(value: Any) -> Any:
+    """Return tuples and arrays as lists."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    return [_listed(one) for one in value] if isinstance(value, tuple) else value
+
+
+def _source(where: str, folder: Path, keys: dict[str, Any]) -> Source:
+    kind = str(keys.get("kind"))
+    where = f"{where} ({kind})"
+    model, build = _KINDS.get(kind, (FileModel, None))
     try:
-        if table.kind not in _KINDS:
+        if build is None:
             return _other(keys)
         given = {
             key: value
             for key, value in model.model_validate(keys).model_dump().items()
             if value is not None and key != "kind"
         }
-        if build is None:
-            file = path.parent / given["file"]
+        if "file" in given:
+            file = folder / given["file"]
             return read_map(file, tolerance_mT=given.get("tolerance_mT"))
         if "side_mm" in given:
             given["sides_mm"] = (given.pop("side_mm"),) * 3

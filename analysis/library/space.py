@@ -18,7 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, ConfigDict, Field, PlainSerializer, WithJsonSchema
 
+from ... import sim
 from ...core.errors import ConfigError
+from ...core.magnet import Magnet
 from ...core.specimen_file import MagnetModel
 from ...core.toml import FileModel, read_toml
 from ...sim import Designs
@@ -133,6 +135,7 @@ PositiveAxis = Annotated[
     _AS_TYPED,
 ]
 ONE_ANGLE = Axis(values=(90.0,), low=90.0, high=90.0)
+ONE_PLACE = Axis(values=(0.0,), low=0.0, high=0.0)
 
 
 class SpaceSection(FileModel):
@@ -165,6 +168,7 @@ class Space(FileModel):
     angle_deg: AnyAxis = ONE_ANGLE
     gap_mm: PositiveAxis | None = None
     magnet: MagnetModel | None = None
+    source: list[dict[str, Any]] | None = Field(default=None, min_length=1)
     descriptors: tuple[str, ...] = ()
     section: list[SpaceSection] = Field(min_length=1)
 
@@ -176,10 +180,14 @@ class Space(FileModel):
         ValueError
             One sentence, which the reader of the file passes on.
         """
-        if (self.flux_mT is None) == (self.gap_mm is None):
+        if self.source is not None and (self.flux_mT or self.magnet) is not None:
+            raise ValueError(
+                "give one of flux_mT (a uniform field), [magnet] and [[source]]"
+            )
+        if self.source is None and (self.flux_mT is None) == (self.gap_mm is None):
             raise ValueError("give either flux_mT (a uniform field) or gap_mm")
-        if (self.gap_mm is None) != (self.magnet is None):
-            raise ValueError("gap_mm and [magnet] belong together")
+        if self.source is None and (self.gap_mm is None) != (self.magnet is None):
+            raise ValueError("gap_mm and [magnet], or [[source]], belong together")
         if self.method == "sobol" and self.designs is None:
             raise ValueError("a sobol space must say how many designs = N")
         if self.method == "grid" and self.designs is not None:
@@ -224,13 +232,18 @@ class Space(FileModel):
         falling: Array = rows[np.all(np.diff(rows, axis=1) <= 0.0, axis=1)]
         return falling
 
+    @cached_property
+    def sources(self) -> Magnet | sim.Field | None:
+        """What bends the rods, if it is no uniform field."""
+        if self.source is not None:
+            return sim.field_of_tables(self.source, self.name, Path())
+        return None if self.magnet is None else self.magnet.magnet()
+
     @property
     def load_axis(self) -> Axis:
-        """The axis of the load: flux or gap."""
+        """The axis of the load: flux or gap; one value where sources have places."""
         axis = self.flux_mT if self.flux_mT is not None else self.gap_mm
-        if axis is None:
-            raise ConfigError("a space must have flux_mT or gap_mm")
-        return axis
+        return axis or ONE_PLACE
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -287,8 +300,8 @@ class Space(FileModel):
             remanence_mT=rem,
             angle_deg=angle,
             flux_mT=load if uniform else None,
-            gap_mm=None if uniform else load,
-            magnet=None if self.magnet is None else self.magnet.magnet(),
+            gap_mm=None if self.gap_mm is None else load,
+            magnet=self.sources,
         )
 
 
@@ -300,7 +313,22 @@ def read_space(path: Path) -> Space:
     ConfigError
         One sentence with file, line and key.
     """
-    return read_toml(path, Space)
+    space = read_toml(path, Space)
+    if space.source is None:
+        return space
+    field = sim.field_of_tables(space.source, str(path), path.parent)
+    if not field.in_plane:
+        raise ConfigError(
+            f"{path}: [[source]]: the sources of a library must bend rods within their "
+            "plane (elevation_deg and z of 0)"
+        )
+    if field.follows_gap != (space.gap_mm is not None):
+        raise ConfigError(
+            f"{path}: gap_mm belongs to sources that have neither centre_mm nor gap_mm "
+            "of their own, and they to it"
+        )
+    # A library explains itself: the readings of a map are in it, not beside it.
+    return space.model_copy(update={"source": sim.tables_of(field)})
 
 
 def sobol_points(dimension: int, start: int, stop: int, seed: int) -> Array:
