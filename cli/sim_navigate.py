@@ -13,7 +13,7 @@ from .sim_case import field_of, only_with, rod_of
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
-    from ..sim.navigate import Lumen, Passage
+    from ..sim.navigate import Branch, Lumen, Passage
     from ..sim.tube import Tube
 
 EXAMPLE = (
@@ -62,6 +62,10 @@ def navigate(
         float | None, typer.Option("--push-limit-N", help="Give up above this, in N.")
     ] = None,
     elements: Annotated[int, typer.Option(help="Elements of the whole rod.")] = 24,
+    branches: Annotated[
+        bool,
+        typer.Option("--branches", help="Follow, through folds, what snaps leave."),
+    ] = False,
     out: Annotated[
         Path | None, typer.Option(help="Folder for tables, figure and film.")
     ] = None,
@@ -101,11 +105,14 @@ def navigate(
         support=Support(gravity_m_s2=gravity_m_s2),
         push_limit_N=float("inf") if push_limit_N is None else push_limit_N,
         elements=elements,
+        branches=branches,
     )
     data = _summary(passage)
     if out is not None:
         write_passage(out, place, passage, rod)
     if as_json:
+        for told, branch in zip(data["branches"], passage.branches, strict=True):
+            told["steps"] = _rows(branch)
         print_json(data | {"steps": [_row(step) for step in passage.steps]})
     else:
         _print(data, passage)
@@ -160,6 +167,16 @@ def _summary(passage: Passage) -> dict[str, Any]:
             {name: getattr(event, name) for name in event.__slots__}
             for event in passage.events
         ],
+        "branches": [
+            {
+                "from_mm": branch.from_mm,
+                "end": branch.end,
+                "folds_mm": branch.folds_mm,
+                "stable_mm": branch.stable_mm,
+                "work_Nmm": branch.work_Nmm,
+            }
+            for branch in passage.branches
+        ],
     } | in_tube
 
 
@@ -184,6 +201,13 @@ def _row(step: Any) -> dict[str, Any]:
     return row
 
 
+def _rows(branch: Branch) -> list[dict[str, Any]]:
+    return [
+        {"index": index} | _row(step)
+        for step, index in zip(branch.steps, branch.indices, strict=True)
+    ]
+
+
 def write_passage(
     folder: Path, lumen: Lumen | Tube, passage: Passage, rod: Specimen
 ) -> None:
@@ -202,6 +226,14 @@ def write_passage(
     ]
     steps = pd.DataFrame(rows).to_csv(index=False)
     write_text(folder / "steps.csv", steps)
+    if passage.branches:
+        states = [
+            {"from_mm": branch.from_mm} | row | {"contacts": len(row["contacts"])}
+            for branch in passage.branches
+            for row in _rows(branch)
+        ]
+        table = pd.DataFrame(states).to_csv(index=False)
+        write_text(folder / "branches.csv", table)
     heads = ["insertion_mm", "wall", "s_mm", "x_mm", "y_mm", "force_N", "friction_N"]
     last = passage.steps[-1]
     if isinstance(last, SpatialStep):
@@ -209,8 +241,8 @@ def write_passage(
         write_text(folder / "shape.csv", last.to_csv())
     else:
         last.centreline.to_csv(folder / "shape.csv")
-    table = pd.DataFrame(contacts, columns=heads)
-    write_text(folder / "contacts.csv", table.to_csv(index=False))
+    pressed = pd.DataFrame(contacts, columns=heads)
+    write_text(folder / "contacts.csv", pressed.to_csv(index=False))
     write_json(folder / "passage.json", _summary(passage))
     side_mm = max(rod.sides_mm)
     draw_passage(folder / "passage.png", lumen, passage, side_mm=side_mm)
@@ -234,6 +266,13 @@ def _print(data: dict[str, Any], passage: Passage) -> None:
             f"{event.moved_mm:.2f} mm and "
             f"{'gains' if event.released_Nmm < 0.0 else 'loses'} "
             f"{abs(event.released_Nmm):.3g} N mm"
+        )
+    for branch in passage.branches:
+        folds = ", ".join(f"{at:.3f}" for at in branch.folds_mm) or "none"
+        again = ", ".join(f"{a:.3f} to {b:.3f}" for a, b in branch.stable_mm)
+        say(
+            f"  branch left     at {branch.from_mm:.3f} mm: folds at {folds}; stable "
+            f"again {again or 'nowhere'}; {len(branch.steps)} states, {branch.end}"
         )
     for event in passage.events:
         if event.kind == "coarse":

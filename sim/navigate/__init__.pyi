@@ -19,6 +19,7 @@ from .lumen import Gate as Gate
 from .lumen import Lumen as Lumen
 from .lumen import Wall as Wall
 from .many import navigate_many as navigate_many
+from .passage import Branch as Branch
 from .passage import Contact as Contact
 from .passage import Event as Event
 from .passage import Passage as Passage

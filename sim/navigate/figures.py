@@ -11,7 +11,7 @@ from ..study.figures import save
 from ..tube.tube import Tube
 from .curves import outline
 from .lumen import Lumen
-from .passage import Passage, Step
+from .passage import Branch, Passage, Step
 from .views import draw_views, rod_in_views, tube_in_space
 
 if TYPE_CHECKING:
@@ -74,13 +74,27 @@ def _curves(figure: Figure, grid: Any, passage: Passage) -> None:
         axes = figure.add_subplot(grid[k, 1], sharex=first)
         first = first or axes
         axes.plot(at, [factor * getattr(step, name) for step in passage.steps], lw=1.2)
+        for branch in passage.branches:
+            _branch(axes, branch, name, factor)
         axes.set_ylabel(label, fontsize=8)
         axes.grid(visible=True, linewidth=0.3)
         for event in passage.events:
             colour = {"snap": "C3", "gate": "C2"}.get(event.kind, "0.6")
             axes.axvline(event.insertion_mm, color=colour, lw=0.8, ls="--")
         axes.tick_params(labelbottom=k == len(rows) - 1)
-    axes.set_xlabel("insertion in mm\n(dashed: grey touch, green gate, red snap)")
+    key = "(dashed: grey touch, green gate, red snap)"
+    if passage.branches:
+        key += "\n(orange: what snaps left, dotted where unstable)"
+    axes.set_xlabel(f"insertion in mm\n{key}")
+
+
+def _branch(axes: Axes, branch: Branch, name: str, factor: float) -> None:
+    """Draw a branch over the insertion: dotted, with a line where it is stable."""
+    at = np.array([step.insertion_mm for step in branch.steps])
+    value = np.array([factor * getattr(step, name) for step in branch.steps])
+    axes.plot(at, value, color="C1", lw=0.9, ls=":")
+    stable = np.where(np.array(branch.indices) == 0, value, np.nan)
+    axes.plot(at, stable, color="C1", lw=1.2)
 
 
 def film(path: Path, lumen: Lumen | Tube, passage: Passage, *, side_mm: float) -> None:

@@ -84,6 +84,12 @@ def at_rest(
     )
 
 
+def copied(touches: Touches) -> Touches:
+    """Return contacts that may be changed."""
+    copies: list[Any] = [array.copy() for array in touches]
+    return Touches(*copies)
+
+
 def follow(case: Case, old: State, rod: Rod, shift: float) -> tuple[Array, Touches]:
     """Return unknowns and contacts of the old state on the new mesh."""
     ahead = 0.0 if case.feeds else shift
@@ -91,8 +97,7 @@ def follow(case: Case, old: State, rod: Rod, shift: float) -> tuple[Array, Touch
     u = unknowns(rod, trace(old.rod, old.u, (s + ahead).ravel())[2].reshape(s.shape))
     if rod.grip[0]:
         u[-1] = rod.grip[3]
-    copies: list[Any] = [array.copy() for array in old.touches]
-    touches = Touches(*copies)
+    touches = copied(old.touches)
     n = touches.used[0]
     s_new = touches.s[:n] - ahead
     s_new[touches.kind[:n] == TIP] = rod.s[-1]
@@ -122,6 +127,16 @@ def rubbing(touches: Touches, before: Before) -> tuple[Array, Array]:
 
 class PlanarWalk(Walk[Case, State]):
     """A rod on its way in the plane."""
+
+    def __init__(self, case: Case, step_mm: float, limit_N: float) -> None:
+        super().__init__(case, step_mm, limit_N)
+        self.left: list[tuple[State, float]] = []
+        """States before snaps, and how far the step was."""
+
+    def seen(self, state: State) -> Step:
+        """Return what a user sees of any state at rest."""
+        state.push = self._push(state)
+        return self._read(state)
 
     def _rest(
         self, old: State | None, insertion_mm: float, soft: float
@@ -153,6 +168,8 @@ class PlanarWalk(Walk[Case, State]):
 
     def _notice(self, old: State | None, new: State, step: Step) -> None:
         super()._notice(old, new, step)
+        if old is not None and self._leaps(old, new):
+            self.left.append((old, new.insertion_mm - old.insertion_mm))
         known = any(event.kind == MEETS for event in self.events)
         side_mm = 2.0 * self.case.half * self.case.length_mm
         if not known and meets_itself(step, side_mm):

@@ -134,6 +134,64 @@ class Event:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Branch:
+    """The branch of states that the rod left in a snap, followed by arc length.
+
+    No hand that pushes can go along it where it is unstable; it tells where a snap
+    back will be, and what else the rod could do.
+
+    Parameters
+    ----------
+    from_mm : float
+        Insertion of the last state before the snap, where it begins.
+    end : str
+        How it ends.
+    steps : tuple of Step
+        Its states, in order.
+    indices : tuple of int
+        In how many directions the energy of each falls: 0 if it is stable.
+    """
+
+    from_mm: float
+    end: str
+    steps: tuple[Step, ...]
+    indices: tuple[int, ...]
+
+    @property
+    def folds_mm(self) -> tuple[float, ...]:
+        """Insertions at which it turns, in order, to within its states."""
+        at = [step.insertion_mm for step in self.steps]
+        return tuple(
+            b
+            for a, b, c in zip(at, at[1:], at[2:], strict=False)
+            if (b - a) * (c - b) < 0
+        )
+
+    @property
+    def stable_mm(self) -> tuple[tuple[float, float], ...]:
+        """Insertions between which it is stable again, in order."""
+        found: list[tuple[float, float]] = []
+        before = 0
+        for step, index in zip(self.steps, self.indices, strict=True):
+            at = step.insertion_mm
+            if index == 0 and before > 0:
+                found.append((at, at))
+            elif index == 0 and found:
+                found[-1] = (found[-1][0], at)
+            before = index
+        return tuple(found)
+
+    @property
+    def work_Nmm(self) -> float:
+        """Work of the push along it, in N mm: in a field that stays, the energy won."""
+        pairs = zip(self.steps, self.steps[1:], strict=False)
+        return sum(
+            0.5 * (a.push_N + b.push_N) * (b.insertion_mm - a.insertion_mm)
+            for a, b in pairs
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Passage:
     """A rod's way through a lumen.
 
@@ -149,6 +207,8 @@ class Passage:
         In the order they happened.
     error_mm : float
         How far the last shape is from the one on elements of half the size.
+    branches : tuple of Branch
+        One for each snap, if they were asked for.
     """
 
     lumen: str
@@ -157,6 +217,7 @@ class Passage:
     steps: tuple[Step, ...]
     events: tuple[Event, ...]
     error_mm: float
+    branches: tuple[Branch, ...] = ()
 
     @property
     def gates(self) -> tuple[str, ...]:

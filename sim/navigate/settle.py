@@ -38,6 +38,9 @@ ROUNDS = 40
 PATIENCE, FROZEN = 6, 20
 """Rounds after which contacts stay where they are and none is dropped; and after which
 none is added. So the set cannot cycle."""
+FREE = 12
+"""Rounds that do not come to rest after which a rod that touches nothing is lost: just
+behind a fold the way down begins slowly."""
 LONGEST = 0.4
 """Most that an angle may change in one step, in rad."""
 PIVOT = 1e-14
@@ -273,8 +276,8 @@ def settle(rod, field, walls, half, mu, u, t, held, before, soft):  # type: igno
             outcome = SETTLED if deepest < TOO_DEEP else JAMMED
             break
         failed += 1 if steps < 0 else 0
-        if failed > 2 and t.used[0] == 0:
-            break  # free, and lost: another round would be the same
+        if failed > FREE and t.used[0] == 0:
+            break
         if k > 8 and worst > 1e-4:
             outcome = JAMMED
         if soft >= SOFT and (failed > 6 or (outcome == JAMMED and k > 14)):

@@ -10,6 +10,7 @@ from ...core.errors import InputError, SolverError
 from ...core.specimen import Specimen
 from ..fields import Support, check_case
 from ..tube.tube import Tube
+from .branch import branches_of
 from .case import Case, FieldOfWay
 from .in_plane import PlanarWalk
 from .in_tube import SpatialPassage, TubeWalk, tube_case
@@ -37,6 +38,7 @@ def navigate(
     elements: int = ELEMENTS,
     tip: tuple[float, float, float] | None = None,
     refine: bool = True,
+    branches: bool = False,
 ) -> Passage:
     """Push a rod through a lumen.
 
@@ -70,6 +72,9 @@ def navigate(
     refine : bool
         Whether to solve the last step again on elements of half the size, for the
         error; with friction the whole way.
+    branches : bool
+        Whether to follow the branches that the rod leaves in snaps, by arc length
+        through folds and unstable states; in a planar lumen, without friction.
 
     Returns
     -------
@@ -103,6 +108,8 @@ def navigate(
         size(step_mm, "step_mm", "mm"), specimen.length_mm / MOST_STEPS,
         specimen.length_mm, "step_mm", "mm",
     )  # fmt: skip
+    if branches:
+        _check_branches(lumen, friction)
     walk: PlanarWalk | TubeWalk
     if isinstance(lumen, Tube):
         _check_tip(lumen, tip)
@@ -129,6 +136,7 @@ def navigate(
         steps=tuple(walk.steps),  # type: ignore[arg-type]
         events=tuple(walk.events),
         error_mm=walk.error_mm() if refine else math.nan,
+        branches=branches_of(walk) if branches and isinstance(walk, PlanarWalk) else (),
     )
 
 
@@ -178,6 +186,20 @@ def _limit(push_limit_N: float) -> float:
     if push_limit_N == math.inf:
         return push_limit_N
     return size(finite(push_limit_N, "push_limit_N", "N"), "push_limit_N", "N")
+
+
+def _check_branches(lumen: Lumen | Tube, friction: float) -> None:
+    """Refuse to follow branches where there are none that one could."""
+    if friction != 0.0:
+        raise InputError(
+            f"friction must be 0 to follow branches; instead received {friction:g}: "
+            "with it a state depends on the way to it"
+        )
+    if isinstance(lumen, Tube):
+        raise InputError(
+            "branches are followed in planar lumens; instead received tube "
+            f"{lumen.name!r}: leave them out"
+        )
 
 
 def _check_tip(tube: Tube, tip: object) -> None:

@@ -59,6 +59,35 @@ def test_a_passage_is_printed_and_written(tmp_path):
     assert (forces["force_N"] > 0.0).all()
 
 
+def test_the_branch_that_a_snap_leaves_is_printed_and_written(tmp_path):
+    """A soft rod in a field that turns past it; each state has its index."""
+    rod, lumen, poses = (tmp_path / f"{name}.toml" for name in ("rod", "wide", "poses"))
+    rod.write_text(
+        'name = "soft"\nside_mm = 1.0\nremanence_mT = 60.0\n'
+        "[[section]]\nlength_mm = 30.0\nE_MPa = 2.0\n"
+    )
+    lumen.write_text(
+        'name = "wide"\n[channel]\nwidth_mm = 90.0\n'
+        "[[channel.leg]]\nstraight_mm = 100.0\n"
+    )
+    poses.write_text(
+        "\n".join(
+            f"[[pose]]\ninsertion_mm = {at}\nflux_mT = 40.0\nangle_deg = {angle}"
+            for at, angle in ((1.0, 150.0), (28.0, 150.0), (29.3, 267.0))
+        )
+    )
+    given = (
+        "navigate", str(lumen), "--specimen", str(rod), "--poses", str(poses),
+        "--way-mm", "28", "--way-mm", "29.3", "--branches",
+    )  # fmt: skip
+    out = tmp_path / "passage"
+    (told,) = json.loads(run(*given, "--out", str(out), "--json"))["branches"]
+    assert told["folds_mm"][0] == pytest.approx(29.2896, abs=2e-3)
+    assert {step["index"] for step in told["steps"]} == {0, 1}
+    states = np.genfromtxt(out / "branches.csv", delimiter=",", names=True)
+    assert list(states["index"]) == [step["index"] for step in told["steps"]]
+
+
 def test_a_passage_through_a_tube_is_printed_and_written(tmp_path):
     out = tmp_path / "passage"
     text = run(
