@@ -4,13 +4,14 @@ Dimensionless as `spatial.march`; `batch.space_room` has the equations. The unkn
 the tip's turn and shift. Newton starts from the unloaded rod, with a matrix of its own
 until corrections are small. A last march with steps half as long corrects the result,
 and by the order of the steps tells what it leaves: 1/63 of its correction, which is
-added. The bound given is three times as much, and what a correction by the matrix kept
-leaves at the rate of the ones before; more where it is large.
+added. The bound given is half of that correction, and what the matrix kept leaves of it
+by the rate of the ones before; more where it is large.
 
 A rod leaves this fast lane (its outcome is `HARD`) when it needs more than `MOST_STEPS`
-steps in a section, is before more than one cuboid, comes near to it or is very far from
-it, when corrections do not shrink as they should, or when the unloaded or the loaded
-rod is not surely stable (`spatial.sure`): `spatial.rows` decides those.
+steps in a section, is before more than one cuboid, might touch it or is very far from
+it, when corrections do not shrink as they should, or when it is not surely stable
+(`spatial.sure`) at a pose on the way, also not by smaller steps of the load:
+`spatial.rows` decides those.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import math
 import numpy as np
 
 from ...core.jit import njit
-from ..magnet.flux import CUBOID, UNIFORM, WIDTH, in_reach
+from ..magnet.flux import CUBOID, UNIFORM, WIDTH, blocked, in_reach
 from ..spatial.march import (  # fmt: skip
     AXIAL,
     C1,
@@ -59,7 +60,7 @@ from .space_room import (
     TRACE,
 )  # fmt: skip
 
-STEP = 0.8
+STEP = 0.65
 """What one step takes of h sqrt(P / EI), and of the turn of the unloaded rod."""
 MOST_STEPS = 6
 """Most steps in a section."""
@@ -75,7 +76,7 @@ CHORD = 4e-2
 """Correction after which the matrix is kept."""
 CLOSE = 2e-3
 """Correction after which a matrix of the pose before leaves a millionth."""
-COARSE = 1e-4
+COARSE = 3e-5
 """Largest correction by steps half as long."""
 LEFT = 1.0 / 63.0
 """What those steps leave of that correction, by their order."""
@@ -259,7 +260,27 @@ def _newton(rows, steps, kind, first, own, b, w, outcome):  # type: ignore[no-un
 
 
 @njit(**OPTIONS)
-def _solve_block(rows, rods, fields, Rc, steps, loads, own, b, w, out, outcome):  # type: ignore[no-untyped-def]
+def _near(field, tip, margin):  # type: ignore[no-untyped-def]
+    """Tell whether a rod clamped at the origin might touch its cuboid.
+
+    A curve of length 1 stays within sqrt(1 - d^2) / 2 of the straight line between its
+    ends, d apart; eight pieces of that line are checked.
+    """
+    if not in_reach(field, margin):
+        return False
+    d2 = tip[0] * tip[0] + tip[1] * tip[1] + tip[2] * tip[2]
+    far = 0.5 * math.sqrt(max(0.0, 1.0 - d2)) + math.sqrt(d2) / 16.0 + margin
+    for k in range(9):
+        at = k / 8.0
+        if blocked(field, at * tip[0], at * tip[1], at * tip[2], far):
+            return True
+    return False
+
+
+@njit(**OPTIONS)
+def _solve_block(  # type: ignore[no-untyped-def]
+    rows, rods, fields, Rc, margins, steps, loads, own, b, w, out, outcome
+):
     """Solve up to LANES rods, of one kind of field, by so many steps of the load."""
     along = fields[rows[0], 0] != UNIFORM
     sections = rods.shape[1]
@@ -284,10 +305,10 @@ def _solve_block(rows, rods, fields, Rc, steps, loads, own, b, w, out, outcome):
     move(w)
     for i in range(rows.shape[0]):
         row = rows[i]
-        if not change[i] < COARSE:
-            outcome[row] = HARD
         _leave(fields[row], i, w, out[row])
-        out[row, 6] = change[i] * (0.05 + w[RATE + i] + 200.0 * change[i]) + ROUNDING
+        if not change[i] < COARSE or _near(fields[row], out[row], margins[row]):
+            outcome[row] = HARD
+        out[row, 6] = change[i] * (0.5 + w[RATE + i] + 200.0 * change[i]) + ROUNDING
 
 
 @njit(**OPTIONS)
@@ -309,7 +330,10 @@ def _steps_of(rod, field, Rc, margin):  # type: ignore[no-untyped-def]
     """Return the steps that each section of a rod needs; 0: not for the lanes."""
     if field[0] == CUBOID:
         if in_reach(field, margin):
-            return 0
+            D, r = Rc.copy(), np.zeros(3)
+            _unloaded(rod, D, r)
+            if _near(field, r, margin):
+                return 0
         most = max(field[1], field[2], field[3])
         away = math.sqrt(field[4] ** 2 + field[5] ** 2 + field[6] ** 2)
         if away + 1.0 > FARTHEST * most:
@@ -346,8 +370,9 @@ def solve_space_lanes(rods, fields, Rc, margins, out, outcome):  # type: ignore[
     for loads in (1, LOADS):
         for number in range(1, MOST_STEPS + 1):
             rows = np.flatnonzero((steps == number) & (outcome == HARD))
+            more = number if loads == 1 else number + 1
             for k in range(0, rows.shape[0], LANES):
                 _solve_block(
-                    rows[k : k + LANES], rods, fields, Rc, number, loads, own, b, w,
-                    out, outcome,
+                    rows[k : k + LANES], rods, fields, Rc, margins, more, loads, own,
+                    b, w, out, outcome,
                 )  # fmt: skip

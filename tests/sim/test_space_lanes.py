@@ -22,21 +22,21 @@ HELD = Support(gravity_m_s2=(1.0, -2.0, -9.0), clamp_angle_deg=10.0)
 TURNED = Magnet.cube(50.0, 1.3, elevation_deg=20.0, offset_mm=(4.0, 3.0, 6.0))
 
 
-def draw(rng, n: int, *, flux: bool, tilted: bool) -> dict:
+def draw(rng, n: int, *, flux: bool, tilted: bool, times: float = 1.0) -> dict:
     designs = {
         "length_mm": rng.uniform(5.0, 15.0, (n, 3)),
         "E_MPa": rng.uniform(8.0, 30.0, (n, 3)),
         "width_mm": rng.uniform(0.7, 1.3, n),
         "height_mm": rng.uniform(0.7, 1.3, n),
-        "remanence_mT": rng.uniform(-25.0, 25.0, (n, 3)),
+        "remanence_mT": times * rng.uniform(-25.0, 25.0, (n, 3)),
         "natural_curvature_per_mm": rng.uniform(-0.01, 0.01, n),
         "density_kg_m3": 2640.0,
     }
     if tilted:
-        designs["remanence_y_mT"] = rng.uniform(-10.0, 10.0, (n, 3))
-        designs["remanence_z_mT"] = rng.uniform(-10.0, 10.0, n)
+        designs["remanence_y_mT"] = times * rng.uniform(-10.0, 10.0, (n, 3))
+        designs["remanence_z_mT"] = times * rng.uniform(-10.0, 10.0, n)
     if not flux:
-        return designs | {"gap_mm": rng.uniform(50.0, 90.0, n)}
+        return designs | {"gap_mm": rng.uniform(30.0, 90.0, n)}
     angles = {
         "angle_deg": rng.uniform(-90.0, 90.0, n),
         "elevation_deg": rng.uniform(-50.0, 50.0, n),
@@ -44,14 +44,14 @@ def draw(rng, n: int, *, flux: bool, tilted: bool) -> dict:
     return designs | angles | {"flux_mT": rng.uniform(10.0, 60.0, n)}
 
 
+@pytest.mark.parametrize(("times", "most"), [(1.0, 0.9), (4.0, 0.7)])
 @pytest.mark.parametrize("tilted", [False, True])
 @pytest.mark.parametrize("flux", [False, True])
-def test_lanes_find_what_single_rods_find(flux: bool, tilted: bool) -> None:
+def test_lanes_find_what_single_rods_find(flux, tilted, times, most) -> None:
     """Within both bounds, on the stable branch; and they find nearly all."""
     n = 150
-    designs = draw(
-        np.random.default_rng([5, flux, tilted]), n, flux=flux, tilted=tilted
-    )
+    rng = np.random.default_rng([5, flux, tilted, int(times)])
+    designs = draw(rng, n, flux=flux, tilted=tilted, times=times)
     magnet = None if flux else TURNED
     columns = space._columns(designs, magnet, HELD)
     rods, total_mm, margins = space._rods(columns, HELD, 0.49)
@@ -63,7 +63,7 @@ def test_lanes_find_what_single_rods_find(flux: bool, tilted: bool) -> None:
     solve_space_lanes(rods, fields, clamp, margins, tips, outcome)
     solve_rods(rods, fields, clamp, margins, boxes, ones, expected, index)
     there = outcome != HARD
-    assert there.mean() > 0.9
+    assert there.mean() > most
     assert not expected[there].any()
     assert not index[there].any()
     off = np.abs(tips - ones)[there]
