@@ -81,3 +81,13 @@ def test_the_faces_of_a_pale_rod_are_in_doubt(plain):
     pale = measured(board)
     assert pale.width_sd_mm > 2.0 * plain.width_sd_mm
     assert abs(pale.width_mm - SIDE) < 3.0 * pale.width_sd_mm
+
+
+def test_a_picture_that_moved_along_the_rod_keeps_both_its_ends():
+    """Its sides stay sharp, and would have the ends sought too close to their edges."""
+    straight = replace(SCENE, centreline=curve("straight", length_mm=LENGTH))
+    moved = measured(replace(straight, light=SceneLight(motion_px=(9.0, -1.0))))
+    assert moved.blur_px < 1.5
+    assert abs(moved.length_mm - LENGTH) < 0.05
+    clamp = moved.pose.from_board(np.array([[-12.0, -6.0]]))[0]
+    assert abs(clamp[0]) < 0.012

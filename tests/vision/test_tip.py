@@ -32,11 +32,11 @@ LOW, HIGH, BLUR = 0.1, 0.8, 1.1
 LINE = EndFace(s=0.0, sigma=0.0, skew=0.0, scatter=0.0, found=1.0)
 
 
-def lanes_over(place, skew, *, slope=0.0, noise=0.0, rng=None):
+def lanes_over(place, skew, *, slope=0.0, noise=0.0, rng=None, blur=BLUR):
     """Blurred steps; the paper's light changes by `slope` per px behind them."""
     t = S[None] - place - skew * ACROSS[:, None]
-    step = 0.5 * (1.0 + erf(t / BLUR / np.sqrt(2.0)))
-    bell = BLUR * np.exp(-0.5 * (t / BLUR) ** 2) / np.sqrt(2.0 * np.pi)
+    step = 0.5 * (1.0 + erf(t / blur / np.sqrt(2.0)))
+    bell = blur * np.exp(-0.5 * (t / blur) ** 2) / np.sqrt(2.0 * np.pi)
     light = LOW + (HIGH - LOW) * step + slope * (t * step + bell)
     return light if rng is None else light + noise * rng.standard_normal(light.shape)
 
@@ -55,6 +55,13 @@ def test_step_on_shade_is_found_without_bias(slope, skew):
         assert face.s == pytest.approx(place, abs=0.003)
         assert face.skew == pytest.approx(skew, abs=0.002)
         assert face.rise == pytest.approx(HIGH - LOW, abs=0.01)
+
+
+@pytest.mark.parametrize("blur", [0.9, 1.4, 1.8])
+def test_a_step_tells_its_own_blur(blur):
+    face = fitted(lanes_over(0.2, 0.05, slope=0.01, blur=blur))
+    assert face.blur == pytest.approx(blur, rel=0.1)
+    assert face.s == pytest.approx(0.2, abs=0.01)
 
 
 def test_step_scatters_as_the_bound_allows():

@@ -52,6 +52,12 @@ class ClampLines:
     face: EndFace | None
     front: EndFace | None
 
+    @property
+    def blur(self) -> float:
+        """Blur along the rod as the clearer line shows it, px; 0 if none was fitted."""
+        seen = [line for line in (self.face, self.front) if line is not None]
+        return max(seen, key=lambda line: line.rise).blur if seen else 0.0
+
     def shifted(self, first: float) -> ClampLines:
         """Return the lines with arc length counted from `first`."""
         face, front = (

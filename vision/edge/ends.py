@@ -49,13 +49,14 @@ def find_ends(
     for far in (reach, 1.3 * width):  # the end of a taper may lie farther on
         tip = find_tip(
             grey, curve, expected=state.last + outwards, width=min(width, taper),
-            blur=state.blur, reach=far, middle=middle, face=face, sign=sign,
-            fine=turn >= _FINE,
+            blur=state.tip_blur or state.blur, reach=far, middle=middle, face=face,
+            sign=sign, fine=turn >= _FINE,
         )  # fmt: skip
         if tip is not None:
             break
     if tip is None:
         raise LostError("no_tip", "the free end of the rod has no edge")
+    state.tip_blur = tip.blur
     if walls is not None and turn >= _FINE:
         tip = _to_end_of_face(tip, state, seen, walls)
     if root == "border":
@@ -63,6 +64,7 @@ def find_ends(
     if root == "free":
         return tip, None, _other_end(grey, state, sign, outwards, reach)
     lines = _clamp_lines(grey, state, seen, sign, turn)
+    state.clamp_blur = lines.blur
     return tip, lines, _first(lines, state.face_px)
 
 
@@ -74,8 +76,8 @@ def _clamp_lines(
     def between_places(low: float, high: float, contrast: float) -> ClampLines:
         return find_clamp(
             grey, state.curve, expected=0.5 * (low + high), width=state.width,
-            blur=state.blur, contrast=contrast, reach=0.5 * (high - low), sign=sign,
-            fine=turn >= _FINE,
+            blur=state.clamp_blur or state.blur, contrast=contrast,
+            reach=0.5 * (high - low), sign=sign, fine=turn >= _FINE,
         )  # fmt: skip
 
     width, contrast = state.width, seen.edges.contrast
@@ -130,7 +132,7 @@ def _to_end_of_face(tip: EndFace, state: State, seen: Seen, walls: Walls) -> End
     away = 2.0 * np.abs(gap) + 0.5 * wall
     paper, level = top + tip.rise, np.zeros(1)
     light = wall_light(wall, away, state.width, top, paper, level, MIRRORED, SKY)
-    blur = math.sqrt(2.0) * state.blur
+    blur = math.sqrt(2.0) * (tip.blur or state.blur)
     short = short_of_end(wall, light, blur, float(wall[0]), 1.0)
     return replace(tip, s=tip.s + float(short[0]))
 

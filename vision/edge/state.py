@@ -38,7 +38,10 @@ class LostError(Exception):
 
 @dataclass(slots=True)
 class State:
-    """What a pass hands to the next: the curve, half widths along it, and the ends."""
+    """What a pass hands to the next: the curve, half widths along it, and the ends.
+
+    The blur of the ends, along the rod, is 0 as long as none was fitted.
+    """
 
     curve: Curve
     half: Array
@@ -50,6 +53,8 @@ class State:
     blur: float = 1.0
     scatter: float = 0.0
     fuzz: float = 0.0
+    tip_blur: float = 0.0
+    clamp_blur: float = 0.0
     flanks: Flanks | None = None
 
 

@@ -26,6 +26,8 @@ STEP_PX = 0.5
 SPAN = 5.5
 """So many blurs of paper are fitted: fewer leave its slope in doubt, and shade is
 straight no farther."""
+_SHARPER, _SOFTER = 0.7, 2.5
+"""By how much an end may be sharper, or softer, than was expected."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -44,8 +46,9 @@ class EndFace:
         RMS distance of the crossings from the line, px.
     found : float
         Part of the lanes that crossed.
-    rise : float
-        Light behind the line minus light before it, of the step that was fitted.
+    rise, blur : float
+        Light behind the line minus light before it, and standard deviation of the blur
+        along the rod, px, of the step that was fitted; 0 where none was.
     """
 
     s: float
@@ -54,6 +57,7 @@ class EndFace:
     scatter: float
     found: float
     rise: float = 0.0
+    blur: float = 0.0
     skew_sd: float = 0.0
 
 
@@ -104,7 +108,8 @@ def fit_step(
     """Return a line moved to where a blurred step fits the lanes best.
 
     Least squares of the step between two levels, the outer one with a slope, blurred by
-    a Gaussian: all samples near the line count, each by what it knows of the place, and
+    a Gaussian, whose width is sought too (what moved along the rod is blurred more than
+    its sides): all samples near the line count, each by what it knows of the place, and
     the levels come as near to the line as the blur allows. A half level between levels
     taken clear of the blur knows less (they are carried farther) and is biased by the
     blur's tails.
@@ -122,20 +127,20 @@ def fit_step(
     crossing : ndarray, shape (k,)
         These; lanes that cross far from the line are left out.
     blur : float
-        Standard deviation of the blur, px; how far the crossings scatter about the line
-        comes on top.
+        Standard deviation of the blur, px, about; how far the crossings scatter about
+        the line comes on top.
     inner, outer : float
         How far before and behind the line to fit, px.
     """
     wide = math.hypot(blur, line.scatter)
     away = np.abs(crossing - line.s - line.skew * across)
     near = away < 3.5 * (line.scatter + 0.02)
-    place, skew, rise = _fit_step(
+    place, skew, rise, fitted = _fit_step(
         light[near], s, across[near], line.s, line.skew, wide, inner, outer
     )
     if not (abs(place - line.s) < 2.0 * wide and rise > 0.0):
         return line
-    line = replace(line, s=place, skew=skew, rise=rise)
+    line = replace(line, s=place, skew=skew, rise=rise, blur=fitted)
     return _to_whole_step(light[near], s, across[near], line, wide, inner, outer)
 
 
@@ -168,14 +173,15 @@ def _to_whole_step(
 def _fit_step(
     light: Array, s: Array, across: Array, place: float, skew: float, blur: float,
     inner: float, outer: float,
-) -> tuple[float, float, float]:  # fmt: skip
-    """Gauss-Newton: two levels, the outer one's slope, and the line's two numbers.
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """Gauss-Newton: two levels, the outer one's slope, the line's two numbers, blur.
 
-    Returns place and skew of the line, and the height of the step.
+    Returns place and skew of the line, and height and blur of the step.
     """
-    change, height = np.empty(5), 0.0
-    for _ in range(2):
-        normal, right = np.zeros((5, 5)), np.zeros(5)
+    change, height = np.empty(6), 0.0
+    least, most = _SHARPER * blur, _SOFTER * blur
+    for _ in range(3):
+        normal, right = np.zeros((6, 6)), np.zeros(6)
         for i in range(across.size):
             at = place + skew * across[i]
             first = max(int(np.ceil((at - inner - s[0]) / (s[1] - s[0]))), 0)
@@ -189,23 +195,25 @@ def _fit_step(
                 change[2] = t * outside + bell
                 change[3] = -bell
                 change[4] = -bell * across[i]
+                change[5] = -bell * t
                 if not np.isfinite(light[i, k]):
                     continue
-                for a in range(5):
+                for a in range(6):
                     right[a] += change[a] * light[i, k]
                     for b in range(a + 1):
                         normal[a, b] += change[a] * change[b]
-        for a in range(5):
+        for a in range(6):
             for b in range(a):
                 normal[b, a] = normal[a, b]
         if not np.linalg.det(normal) > 0.0:
-            return place, skew, 0.0
+            return place, skew, 0.0, blur
         found = np.linalg.solve(normal, right)
         height = found[1] - found[0]
         step = blur / height
         place += step * found[3]
         skew += step * found[4]
-    return place, skew, height
+        blur = min(max(blur + step * found[5], least), most)
+    return place, skew, height, blur
 
 
 def line_through(across: Array, crossing: Array) -> EndFace | None:
