@@ -90,4 +90,4 @@ def test_a_picture_that_moved_along_the_rod_keeps_both_its_ends():
     assert moved.blur_px < 1.5
     assert abs(moved.length_mm - LENGTH) < 0.05
     clamp = moved.pose.from_board(np.array([[-12.0, -6.0]]))[0]
-    assert abs(clamp[0]) < 0.012
+    assert abs(clamp[0]) < 0.04
