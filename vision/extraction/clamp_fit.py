@@ -26,18 +26,18 @@ from .told_clamp import ToldClamp, surer_direction
 
 Array = NDArray[np.float64]
 
-SUPPLE, SUPPLE_FREEDOM = 1.2, 5.0
+SUPPLE, SUPPLE_FREEDOM = 1.0, 5.0
 """Factor on the fit's own deviation of the direction at the clamp for a curve of so
 many free numbers, and with the root of more: they were chosen by the same points."""
 BENT_BACK, BACK, BENT = 1.5, 0.25, 0.01
 """Factor for a rod that is bent both ways, the lesser way by this share at least, and
 by so much over its width: no single force makes that, and what is known of moments
 helps less at the root."""
-TURN_SHADE, TURN_WALL, TURN_PALE_WALL = 0.35, 0.14, 0.4
+TURN_SHADE, TURN_WALL, TURN_PALE_WALL = 0.35, 0.05, 0.4
 """Shares of the shade's pull, and of the side wall that is seen (on a rod that is not
 dark: its light is not known), by which the midline is off all along, with one sign."""
 DRIFT_SHADE, DRIFT_WHITE, DRIFT_REACH = 0.15, 0.03, 1.5
-DRIFT_BENT, DRIFT_PALE_BENT = 0.15, 0.4
+DRIFT_BENT, DRIFT_PALE_BENT = 0.17, 0.4
 """Errors that neighbours share over so many widths: of the shade's pull; of the blur
 where the paper is white; and, px, by the angle that a rod turns over its width, for
 then the light on its sides changes."""

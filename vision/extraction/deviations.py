@@ -21,14 +21,16 @@ from .refine import Refined
 
 Array = NDArray[np.float64]
 
-TIP_BLUR, WIDTH_PX, WIDTH_SHADE = 0.04, 0.055, 0.3
-"""Systematic parts: of an end face whose edge is not straight, in blurs; of a width
-whose blur is no Gaussian's; and the share of a shade's pull that is left in a width."""
-FACE_SEEN, FACE_HIDDEN = 0.17, 0.1
+TIP_BLUR, TIP_SCATTER = 0.02, 0.5
+"""Doubt of an end: in its blurs, and in the scatter of its crossings, which are those
+of an edge that is not straight."""
+WIDTH_BLUR, WIDTH_SHADE = 0.045, 0.6
+"""Doubt of a width: in blurs, which are no Gaussian's, and the share of a shade's pull
+that is left in it."""
+FACE_SEEN, FACE_HIDDEN = 0.18, 0.02
 """Doubt of where an end is, in widths of its face where the camera sees it (it has
-another grey value than the top); else, where a lower edge is hidden, of that width
-times the tangent of the angle at which it would be seen."""
-SIDE_FACE, PALE_FACE, WIDTH_FACE = 0.07, 0.5, 0.03
+another grey value than the top), or where its lower edge is hidden."""
+SIDE_FACE, PALE_FACE, WIDTH_FACE = 0.025, 0.5, 0.01
 """Doubt of where a side ends whose face is seen, in widths of that face: on a dark rod,
 one that is not dark, and what of it is left in a dark rod's width."""
 PALE_PX = 0.2
@@ -87,7 +89,7 @@ def with_deviations(
     clamp = math.sqrt(clamped[0, 0])
     rise = float(view.rise_along[-1])
     seen = rise < 0.0 or not dark
-    face = rise * (FACE_SEEN if seen else FACE_HIDDEN * rise / float(view.along[-1]))
+    face = rise * (FACE_SEEN if seen else FACE_HIDDEN)
     tip = math.hypot(
         refined.tip.sigma,
         TIP_BLUR * refined.blur,
@@ -97,7 +99,7 @@ def with_deviations(
     wall = WIDTH_FACE if dark else PALE_FACE
     width = math.hypot(
         median(refined.sigma_width) / math.sqrt(max(1.0, _widths(refined))),
-        WIDTH_PX if dark else PALE_PX,
+        WIDTH_BLUR * refined.blur if dark else PALE_PX,
         WIDTH_SHADE * median(refined.shaded),
         wall * median(np.abs(view.rise_across)) * result.width_mm,
         2.0 * white_px(refined),

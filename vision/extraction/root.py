@@ -23,9 +23,10 @@ from .setting import UNKNOWN_CLAMP_MM, Setting
 HIDDEN_MM = 0.05
 """What part of the root a clamp of unknown height may hide before that is named."""
 
-LINE_PX, BORDER_PX, CARRIED = 0.055, 0.3, 0.03
-"""Standard deviation of a place that a line tells, and of where a rod enters the
-picture; and of how far a line is carried to the height of the axis, as a share."""
+LINE_BLUR, LINE_SCATTER, BORDER_PX, CARRIED, BETWEEN = 0.025, 0.7, 0.3, 0.01, 0.15
+"""Standard deviation of a place that a line tells: in its blurs, and in the scatter of
+its crossings, which shade makes; px, of where a rod enters the picture; and as shares
+of how far a line is carried to the height of the axis, and two lines are apart."""
 
 
 _STEP_PX = 20.0
@@ -83,7 +84,7 @@ def root_place(
         hidden = hidden_px(refined, setting, rise) / math.sqrt(3.0)
         place, line = _hidden_root(refined, ends, setting), front or face
         carried = 0.0 if line is None else place - line.s
-        return RootPlace(s=place, sd=_sd(carried, hidden), hidden=hidden)
+        return RootPlace(s=place, sd=_sd(line, carried, hidden), hidden=hidden)
     seen_at, axis_mm = [], setting.axis_height_mm
     if face is not None:
         seen_at.append(_below(refined, face, axis_mm + 0.5 * side_mm, setting))
@@ -94,19 +95,22 @@ def root_place(
     if face is None or front is None:
         line = front or face
         carried = 0.0 if line is None else seen_at[0] - line.s
-        return RootPlace(s=seen_at[0], sd=_sd(carried))
+        return RootPlace(s=seen_at[0], sd=_sd(line, carried))
     apart, carried = seen_at[1] - seen_at[0], seen_at[1] - front.s
     if abs(apart) <= APART_PX:
         place = between(seen_at[0], seen_at[1], refined.clamp)
-        return RootPlace(s=place, sd=_sd(carried, 0.5 * apart), apart=apart)
+        clear = max(face, front, key=lambda line: line.rise)
+        return RootPlace(s=place, sd=_sd(clear, carried, BETWEEN * apart), apart=apart)
     if is_face(apart, setting.face_px(refined.fit.curve)):
-        return RootPlace(s=seen_at[1], sd=_sd(carried))
+        return RootPlace(s=seen_at[1], sd=_sd(front, carried))
     return RootPlace(s=seen_at[0], sd=0.5 * abs(apart), apart=apart)
 
 
-def _sd(carried: float, other: float = 0.0) -> float:
-    """Return the deviation of a place from lines that were carried so far, px."""
-    return math.hypot(LINE_PX, CARRIED * carried, other)
+def _sd(line: EndFace | None, carried: float, other: float = 0.0) -> float:
+    """Return the deviation of a place from a line that was carried so far, px."""
+    own = 0.0 if line is None else LINE_SCATTER * line.scatter
+    blur = 0.0 if line is None else LINE_BLUR * line.blur
+    return math.hypot(own, blur, CARRIED * carried, other)
 
 
 def root_hidden(refined: Refined, setting: Setting) -> bool:
