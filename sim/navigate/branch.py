@@ -153,7 +153,10 @@ def _touched(
     else:
         return None
     force = touching.touches.force[: touching.touches.used[0]]
-    k = int(np.flatnonzero(force == 0.0)[-1])  # the one that was added
+    added = np.flatnonzero(force == 0.0)
+    if len(added) == 0:
+        return None
+    k = added[-1]
     onwards = tangent(case, touching, weights * towards, weights)
     return touching, -onwards if _opening(case, touching, onwards)[k] > 0.0 else onwards
 
