@@ -31,7 +31,7 @@ from .batch.threads import (
 from .batch.tips import (
     solve_many as solve_many,
 )
-from .check.verify import (
+from .check.against import (
     verify as verify,
 )
 from .equilibria.find import (

@@ -1,3 +1,6 @@
+from .against import (
+    verify as verify,
+)
 from .solver import (
     CheckSolution as CheckSolution,
 )
@@ -9,7 +12,4 @@ from .space import (
 )
 from .space import (
     check_spatial as check_spatial,
-)
-from .verify import (
-    verify as verify,
 )

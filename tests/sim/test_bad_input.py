@@ -24,7 +24,7 @@ from magbend.sim import (
     solve_many,
 )
 from magbend.sim.batch.shapes import Designs, designs_of, solve_shapes
-from magbend.sim.check.verify import verify
+from magbend.sim.check.against import verify
 from magbend.sim.equilibria.find import find_equilibria
 from magbend.sim.scaling import field_array, rod_array, stations
 from magbend.sim.spatial.solver import SpatialRod, SpatialSection, solve_spatial

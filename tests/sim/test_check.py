@@ -11,9 +11,9 @@ from magbend.core.errors import InputError
 from magbend.core.magnet import Magnet
 from magbend.core.specimen import Section
 from magbend.sim import MagnetField, Support, UniformField, gmc
+from magbend.sim.check.against import verify
 from magbend.sim.check.energy import discretise, energy, hessian
 from magbend.sim.check.solver import check_solve
-from magbend.sim.check.verify import verify
 from magbend.sim.one_rod import solve
 
 CUBE = Magnet.cube(55.0, 1.305)
