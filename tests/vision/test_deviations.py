@@ -91,3 +91,11 @@ def test_a_picture_that_moved_along_the_rod_keeps_both_its_ends():
     assert abs(moved.length_mm - LENGTH) < 0.05
     clamp = moved.pose.from_board(np.array([[-12.0, -6.0]]))[0]
     assert abs(clamp[0]) < 0.04
+
+
+def test_a_bent_rod_that_moved_is_as_wide_where_it_ran_along_as_where_it_ran_across():
+    bent = replace(SCENE, centreline=curve("arc", angle_deg=95.0, length_mm=LENGTH))
+    moved = measured(replace(bent, light=SceneLight(motion_px=(9.0, 0.0))))
+    assert abs(moved.width_mm - SIDE) < 0.02
+    width = moved.points["width_mm"][10:-10]
+    assert np.abs(width - SIDE).mean() < 0.03

@@ -12,7 +12,9 @@ mean of the two levels; that term is kept.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,10 +83,17 @@ class Edges:
     @property
     def blur(self) -> float:
         """Standard deviation of the blur, from the slope at the edges, in px."""
+        return self._blur(slice(None))
+
+    def blurs(self, parts: int) -> Array:
+        """Return the blur of so many parts along the rod, shape (parts,), in px."""
+        return np.array([self._blur(part) for part in slices(len(self.low), parts)])
+
+    def _blur(self, part: slice) -> float:
         rise = np.concatenate(
             [
-                (self.outer_low - self.inner) / self.slope_low,
-                (self.outer_high - self.inner) / self.slope_high,
+                (self.outer_low - self.inner)[part] / self.slope_low[part],
+                (self.outer_high - self.inner)[part] / self.slope_high[part],
             ]
         )
         variance = (median(rise) / _ROOT_2PI) ** 2 - _SLOPE_VARIANCE
@@ -173,6 +182,22 @@ def find_edges(
         inner=0.5 * (out[0, 2] + out[1, 2]), outer_low=out[0, 3], outer_high=out[1, 3],
         shade_low=out[0, 4], shade_high=out[1, 4],
     )  # fmt: skip
+
+
+def joined(parts: Sequence[Edges]) -> Edges:
+    """Return edges along a rod whose parts were sought each by itself."""
+    return Edges(
+        **{
+            field.name: np.concatenate([getattr(part, field.name) for part in parts])
+            for field in fields(Edges)
+        }
+    )
+
+
+def slices(count: int, parts: int) -> list[slice]:
+    """Return equal parts of a number of stations."""
+    bounds = np.linspace(0, count, parts + 1).astype(int)
+    return [slice(*ends) for ends in pairwise(bounds)]
 
 
 def clear_of(blur: float) -> float:

@@ -40,7 +40,8 @@ class LostError(Exception):
 class State:
     """What a pass hands to the next: the curve, half widths along it, and the ends.
 
-    The blur of the ends, along the rod, is 0 as long as none was fitted.
+    The blur of the ends, along the rod, is 0 as long as none was fitted; `blurs` is
+    that of parts of its sides where it is uneven, as motion makes it on a bent rod.
     """
 
     curve: Curve
@@ -53,6 +54,7 @@ class State:
     blur: float = 1.0
     scatter: float = 0.0
     fuzz: float = 0.0
+    blurs: Array | None = None
     tip_blur: float = 0.0
     clamp_blur: float = 0.0
     flanks: Flanks | None = None

@@ -49,7 +49,7 @@ def to_whole_edges(
     bounds = np.linspace(0, len(seen.s), _PIECES + 1).astype(np.int64)
     if anew or state.flanks is None:
         state.flanks = _flanks(grey, state, seen, bounds, walls, sign)
-    state.blur = state.flanks.blur
+    state.blur, state.blurs = state.flanks.blur, None
     middles = _means(seen.s, bounds)
     low, high = (np.interp(seen.s, middles, sign * by) for by in state.flanks.moves(2))
     moved = replace(seen.edges, low=seen.edges.low - low, high=seen.edges.high + high)

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 TIP_BLUR, TIP_SCATTER = 0.02, 0.5
 """Doubt of an end: in its blurs, and in the scatter of its crossings, which are those
 of an edge that is not straight."""
-WIDTH_BLUR, WIDTH_SHADE = 0.045, 0.6
+WIDTH_BLUR, WIDTH_SHADE = 0.037, 0.6
 """Doubt of a width: in blurs, which are no Gaussian's, and the share of a shade's pull
 that is left in it."""
 FACE_SEEN, FACE_HIDDEN = 0.18, 0.02

@@ -17,7 +17,7 @@ from ..curve.problem import SHARED, pose
 from ..curve.robust import median
 from ..curve.spline import Smooth
 from ..edge.clamp import ClampLines
-from ..edge.edges import Edges, find_edges
+from ..edge.edges import Edges, find_edges, joined, slices
 from ..edge.ends import find_ends
 from ..edge.flank import is_held
 from ..edge.state import LostError, Root, Seen, State
@@ -42,6 +42,8 @@ _NEAR_STILL_PX = 0.08
 """The first of them in a film, where time counts: what is left is a part of it."""
 _KEPT_PX = 0.05
 """A curve that moves by less keeps its joints, and the light beside white paper."""
+_BLUR_PARTS, _UNEVEN = 8, 0.35
+"""Parts of a rod whose blur is known by itself where it differs by that share."""
 _BIN_PX = 4.0
 _BINS = 200
 """Stations are averaged over bins before the fit: so far, or so many on a long rod."""
@@ -209,10 +211,14 @@ def _look(grey: Image, state: State, sign: float, turn: int, *, seeking: bool) -
         fuzz = 4.0 * state.scatter
         reach = min(max(3.0, 3.0 * state.blur, 3.0 * fuzz), 0.45 * width)
     state.fuzz = fuzz
-    edges = find_edges(
-        grey, points, normals, -half, half,
-        reach=reach, blur=state.blur, fuzz=fuzz, sign=sign, smooth=int(6.0 / step),
-    )  # fmt: skip
+    blurs = np.array([state.blur]) if state.blurs is None else state.blurs
+    edges = joined([
+        find_edges(
+            grey, points[part], normals[part], -half[part], half[part], reach=reach,
+            blur=blur, fuzz=fuzz, sign=sign, smooth=int(6.0 / step),
+        )
+        for part, blur in zip(slices(len(s), len(blurs)), blurs, strict=True)
+    ])  # fmt: skip
     good = edges.usable(least=FLARED * width if state.rough else 0.6)
     if good.sum() < max(8.0, 0.4 * len(good)):
         raise LostError(
@@ -222,6 +228,9 @@ def _look(grey: Image, state: State, sign: float, turn: int, *, seeking: bool) -
     state.width = median(edges.width[good])
     blur = edges.blur
     state.blur = float(np.clip(blur, 0.3, 0.5 * state.width)) if blur > 0 else 1.0
+    if turn and not state.rough:
+        local = np.clip(edges.blurs(_BLUR_PARTS), 0.3, 0.5 * state.width)
+        state.blurs = local if np.ptp(local) > _UNEVEN * state.blur else None
     state.scatter = _scatter(edges, int(5.0 / step))
     return Seen(s, theta, edges, good)
 
