@@ -42,7 +42,7 @@ def index_in_space(
     gamma, x, y, phi = tip.tolist()
     c, s = math.cos(gamma + phi), math.sin(gamma + phi)
     turn, place = np.array([[-s, 0.0, c], [c, 0.0, s], [0.0, 1.0, 0.0]]), [x, y, 0.0]
-    table = _held(specimen, support)[1]
+    table = _held(specimen, support)[0]
     try:
         n = _steps(table, field, np.array(place))
     except InputError:

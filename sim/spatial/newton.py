@@ -283,7 +283,7 @@ def solve_pose(rod, field, n, Rc, R, r, goal, held):  # type: ignore[no-untyped-
         if load < 1.0:
             lost = index == LOST or np.max(np.abs(J)) > STEEP
             return LOST if lost else -1, load, 0.0
-    run(rod, field, 1.0, 2.0 * n, R, r, False, math.inf, held)
+    run(rod, field, 1.0, 2.0 * n, R, r, False, 0.0, held)
     _miss(held[0][0], Rc, x)
     error = np.sum(np.abs(x))
     solve6(J, x)

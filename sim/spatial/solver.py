@@ -184,9 +184,8 @@ def solve_spatial(
             f"received {shown(rod)} and {shown(support)}"
         )
     points = whole(points, 2, MOST_POINTS, "points")
-    rod, table, margin = _held(rod, support)
-    unit_Nmm = rod.sections[0].stiffness_Nmm2[1] / rod.length_mm
-    return solve_table(table, margin, rod.length_mm, unit_Nmm, field, support, points)
+    table, margin, length_mm, unit_Nmm = _held(rod, support)
+    return solve_table(table, margin, length_mm, unit_Nmm, field, support, points)
 
 
 def solve_table(
@@ -284,12 +283,14 @@ def _equilibrium(
 @lru_cache(maxsize=256)
 def _held(
     rod: SpatialRod | Specimen, support: Support
-) -> tuple[SpatialRod, Array, float]:
-    """Return the rod, its table for the kernels, and half its side over its length."""
+) -> tuple[Array, float, float, float]:
+    """Return a rod's table for the kernels, margin, length, and unit of moments."""
     if isinstance(rod, Specimen):
         rod = SpatialRod.from_specimen(rod)
     sides = [min(part.width_mm, part.height_mm) for part in rod.sections]
-    return rod, rod_table(rod, support), 0.5 * max(sides) / rod.length_mm
+    L = rod.length_mm
+    unit_Nmm = rod.sections[0].stiffness_Nmm2[1] / L
+    return rod_table(rod, support), 0.5 * max(sides) / L, L, unit_Nmm
 
 
 def _flux_array(field: Field | Sequence[float], length_mm: float) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,14 @@ from magbend.sim.magnet.jet import JET, jet_at
 from magbend.sim.scaling import field_array
 from magbend.sim.spatial.index import morse_index
 from magbend.sim.spatial.march import BLOCK, STATE, Y, Z
-from magbend.sim.spatial.newton import newton, room, run, unloaded
+from magbend.sim.spatial.newton import (
+    STILL,
+    newton,
+    room,
+    run,
+    solve_pose,
+    unloaded,
+)
 from magbend.sim.spatial.rod import SpatialRod, clamp_of, rod_table
 
 SUPPORT = Support(gravity_m_s2=(0.0, -3.0, -9.0))
@@ -77,6 +86,21 @@ def test_the_field_along_a_curve_is_the_field() -> None:
         misses.append(np.abs(ends[1] - ends[0]).max())
     assert 0.0 < misses[1] < 3e-8
     assert misses[0] > 40.0 * misses[1]
+
+
+def test_the_last_march_leaves_its_table_to_that_for_the_shape() -> None:
+    """The field along the curve is looked up once for both, at no loss."""
+    away = Field(replace(CUBOID, gap_mm=60.0))
+    rod, field, n, clamp = table(ROD), field_array(away, 30.0), 20.0, clamp_of(SUPPORT)
+    R, r, held = np.empty((3, 3)), np.empty(3), room(rod, field, 2.0 * n)
+    index, load, _ = solve_pose(rod, field, n, clamp, R, r, 1e-9, held)
+    assert (index, load) == (0, 1.0)
+    assert held[3][2] <= STILL
+    ends = []
+    for moved in (0.0, np.inf):
+        run(rod, field, 1.0, 2.0 * n, R, r, False, moved, held)
+        ends.append(held[0][0][Y : Y + STATE].copy())
+    assert ends[0] == pytest.approx(ends[1], abs=1e-11)
 
 
 def test_what_is_surely_stable_has_no_focal_point() -> None:
