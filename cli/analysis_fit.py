@@ -15,6 +15,7 @@ from .run_options import (
     CLAMP,
     GRAVITY,
     LOAD,
+    MAGNET,
     RUNS,
     UNVERIFIED,
     choice,
@@ -37,9 +38,7 @@ def fit(
         None, "--out", help="fit.json; in the first run folder if not given."
     ),
     field: str = typer.Option("magnet", "--field", help="magnet or uniform."),
-    magnet: Path = typer.Option(
-        None, "--magnet", help="Source file instead of the magnet of the runs."
-    ),
+    magnet: Path = MAGNET,
     model: str = typer.Option("rod", "--model", help="rod or solid."),
     free: list[str] = typer.Option(
         [],

@@ -17,6 +17,7 @@ from .run_options import (
     CLAMP,
     GRAVITY,
     LOAD,
+    MAGNET,
     RUNS,
     UNVERIFIED,
     choice,
@@ -54,6 +55,7 @@ def compare(
     clamp_angle_deg: float = CLAMP,
     gravity_m_s2: tuple[float, float, float] = GRAVITY,
     load_factor: float = LOAD,
+    magnet: Path = MAGNET,
     unverified: bool = UNVERIFIED,
     json: bool = JSON,
 ) -> None:
@@ -63,7 +65,9 @@ def compare(
     choice(model, ("rod", "solid"), "--model")
     loaded, left_out = loaded_runs(runs, unverified=unverified)
     outputs(out, *(run.path / "comparison.csv" for run in loaded))
-    done = compared(loaded, left_out, model, clamp_angle_deg, gravity_m_s2, load_factor)
+    done = compared(
+        loaded, left_out, model, clamp_angle_deg, gravity_m_s2, load_factor, magnet
+    )
     if refit:
         done = [with_refitted(run, theory=model) for run in done]
     for run in done:
@@ -90,6 +94,7 @@ def report(
     clamp_angle_deg: float = CLAMP,
     gravity_m_s2: tuple[float, float, float] = GRAVITY,
     load_factor: float = LOAD,
+    magnet: Path = MAGNET,
     unverified: bool = UNVERIFIED,
     json: bool = JSON,
 ) -> None:
@@ -103,8 +108,12 @@ def report(
         loaded[0].path / "report.html" if len(loaded) == 1 else Path("report.html")
     )
     outputs(path, *(run.path / "comparison.csv" for run in loaded))
-    done = compared(loaded, left_out, model, clamp_angle_deg, gravity_m_s2, load_factor)
-    fits = [None if no_fit else try_fit(run.run, run.support) for run in done]
+    done = compared(
+        loaded, left_out, model, clamp_angle_deg, gravity_m_s2, load_factor, magnet
+    )
+    fits = [
+        None if no_fit else try_fit(run.run, run.support, run.sources) for run in done
+    ]
     with progress("report") as tell:
         files = write_report(
             done,
@@ -224,10 +233,13 @@ def compared(
     clamp_angle_deg: float = 0.0,
     gravity_m_s2: tuple[float, float, float] | None = None,
     load_factor: float = 1.0,
+    magnet: Path | None = None,
 ) -> list[RunComparison]:
     """Compare each run; add a sentence to `left_out` on each that cannot be."""
     from ..analysis import compare_run
+    from ..sim import read_field
 
+    sources = read_field(magnet) if magnet is not None else None
     done, errors = [], []
     with progress("compare") if len(loaded) > 4 else nullcontext(silent) as tell:
         for number, run in enumerate(loaded, start=1):
@@ -235,7 +247,9 @@ def compared(
                 run.support, clamp_angle_deg, gravity_m_s2, load_factor
             )
             try:
-                done.append(compare_run(run, support=support, model=model))
+                done.append(
+                    compare_run(run, support=support, model=model, sources=sources)
+                )
             except MagbendError as error:
                 errors.append(error)
                 left_out.append(f"{run.path}: {error}")

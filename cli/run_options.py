@@ -22,6 +22,9 @@ GRAVITY = typer.Option(
     help="Weight x y z in the specimen frame instead of [bench] of the rig file; "
     "0 0 -9.81 is a bench seen from above.",
 )
+MAGNET = typer.Option(
+    None, "--magnet", help="Source file instead of the magnet of the runs."
+)
 LOAD = typer.Option(1.0, "--load-factor", help="Factor on the magnetic load.")
 MOST_CLAMP_DEG = 45.0
 """A clamp further off +x is none of a measured run, whose rod leaves it along +x."""

@@ -61,6 +61,9 @@ from .fields import (
 from .fields import (
     before as before,
 )
+from .fields import (
+    kinds_of as kinds_of,
+)
 from .magnet.field import (
     magnet_flux_mT as magnet_flux_mT,
 )

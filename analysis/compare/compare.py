@@ -1,8 +1,8 @@
 """Measured against simulated centrelines, step by step, in both field models.
 
 `uniform` is the paper's assumption: the flux read at the undeformed tip, everywhere.
-`magnet` is the cuboid with one remanence fitted to all readings of the run. What lies
-between the two is the price of the assumption.
+`magnet` is the cuboid with one remanence fitted to all readings of the run, or any
+sources, as they are given. What lies between the two is the price of the assumption.
 """
 
 from __future__ import annotations
@@ -174,6 +174,8 @@ class RunComparison(Tabular):
         One a step and model, steps first.
     magnet : Magnet or None
         The magnet with the fitted remanence.
+    sources : Field or None
+        What was taken in the place of the run's magnet.
     magnet_fit : MagnetFit or None
         How the readings fit one remanence, with a verdict on each.
     support : Support
@@ -185,6 +187,7 @@ class RunComparison(Tabular):
     magnet: Magnet | None
     magnet_fit: sim.MagnetFit | None
     support: sim.Support
+    sources: sim.Field | None = None
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -225,6 +228,7 @@ def compare_run(
     specimen: Specimen | None = None,
     support: sim.Support | None = None,
     model: str = "rod",
+    sources: sim.Field | None = None,
 ) -> RunComparison:
     """Compare every step of a run with the prediction, in both field models.
 
@@ -238,12 +242,15 @@ def compare_run(
         Clamp angle, weight, load factor; by default the weight of the run's bench.
     model : {"rod", "solid"}
         Rod theory (see `sim.solve`).
+    sources : Field, optional
+        In the place of the run's magnet, as strong as they are; those that wait for a
+        gap stand at that of each step.
     """
     specimen = specimen or run.specimen
     support = support or run.support
-    fit, magnet = fit_run_magnet(run)
+    fit, magnet = (None, None) if sources is not None else fit_run_magnet(run)
     comparisons = [
-        _compare(run, step, name, specimen, magnet, support, model)
+        _compare(run, step, name, specimen, sources or magnet, support, model)
         for step in run.steps
         for name in (*MODELS, *((IMPORTED,) if step.imported else ()))
     ]
@@ -253,6 +260,7 @@ def compare_run(
         magnet=magnet,
         magnet_fit=fit,
         support=support,
+        sources=sources,
     )
 
 
@@ -300,19 +308,44 @@ def usable_flux(step: Step) -> bool:
 
 
 def field_of(
-    step: Step, model: str, magnet: Magnet | None
-) -> sim.UniformField | sim.MagnetField | str:
-    """Return the field of a step, or a sentence that says why there is none."""
+    step: Step, model: str, magnet: Magnet | sim.Field | None, length_mm: float
+) -> sim.Field | str:
+    """Return the field of a step, or a sentence that says why there is none.
+
+    `length_mm` is that of the rod, to whose undeformed tip the gap counts.
+    """
     if model == "magnet":
         if magnet is None:
             return "no magnet: no rig file and no analysis import --magnet names one"
+        if isinstance(magnet, sim.Field) and not magnet.follows_gap:
+            return magnet
         if not math.isfinite(step.gap_mm):
             return "no gap: the table of this run does not say it"
+        if isinstance(magnet, sim.Field):
+            return magnet.at_gap(step.gap_mm)
         return sim.MagnetField(magnet=magnet, gap_mm=step.gap_mm)
     if not usable_flux(step):
         return f"no field reading: the Tesla-meter said {step.flux_status}"
-    angle_deg = magnet.axis_angle_deg if magnet else 90.0
+    angle_deg = flux_angle_deg(step, magnet, length_mm)
     return sim.UniformField(flux_mT=step.flux_mT, angle_deg=angle_deg)
+
+
+def flux_angle_deg(
+    step: Step, magnet: Magnet | sim.Field | None, length_mm: float
+) -> float:
+    """Return the direction of the flux that a meter at the undeformed tip reads."""
+    if not isinstance(magnet, sim.Field):
+        return magnet.axis_angle_deg if magnet else 90.0
+    if magnet.follows_gap and not math.isfinite(step.gap_mm):
+        return 90.0
+    field = magnet.at_gap(step.gap_mm) if magnet.follows_gap else magnet
+    return flux_at_tip_mT(field, length_mm)[1]
+
+
+def flux_at_tip_mT(field: sim.Field, length_mm: float) -> tuple[float, float]:
+    """Return size and direction (deg) of the flux at the undeformed tip."""
+    x, y, z = sim.flux_mT(field, np.array([length_mm, 0.0, 0.0]), length_mm=length_mm)
+    return float(np.linalg.norm([x, y, z])), math.degrees(math.atan2(y, x))
 
 
 def describe(line: Centreline) -> Descriptors:
@@ -349,7 +382,7 @@ def _compare(
     step: Step,
     name: str,
     specimen: Specimen,
-    magnet: Magnet | None,
+    magnet: Magnet | sim.Field | None,
     support: sim.Support,
     model: str,
 ) -> Comparison:
@@ -369,7 +402,7 @@ def _compare(
         if problem or frame is None or frame.centreline is None:
             return replace(base, status=problem or "no centreline")
         return _measured_against(base, frame.centreline, step.imported, None)
-    field = field_of(step, name, magnet)
+    field = field_of(step, name, magnet, specimen.length_mm)
     if isinstance(field, str):
         return replace(base, status=problem or field)
     solution = sim.solve(specimen, field, support=support, model=model)
@@ -394,7 +427,7 @@ def _measured_against(
     base: Comparison,
     measured: Centreline,
     simulated: Centreline,
-    field: sim.UniformField | sim.MagnetField | None,
+    field: sim.Field | None,
 ) -> Comparison:
     try:
         errors = metrics.shape_errors(measured, simulated)

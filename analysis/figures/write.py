@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...core.files import output_folder, write_bytes, write_text
+from ...sim import kinds_of
 from ..compare.compare import RunComparison
 from ..fit.result import FitResult
 from .bench import bench_figure
@@ -181,8 +182,11 @@ def methods_text(runs: Sequence[RunComparison]) -> str:
     steps = sum(len(run.run.steps) for run in runs)
     kinds = {_kind(run) for run in runs}
     rods = ", ".join(dict.fromkeys(run.run.specimen.name for run in runs))
+    given = [kinds_of(run.sources) for run in runs if run.sources is not None]
     magnets = [run.magnet for run in runs if run.magnet is not None]
     field = ""
+    if given:
+        field = f" The field was that of given sources: {given[0]}."
     if magnets:
         sides = " x ".join(f"{side:g}" for side in magnets[0].sides_mm)
         field = (

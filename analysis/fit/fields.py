@@ -10,8 +10,6 @@ import math
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from ... import sim
 from ...core.errors import InputError
 from ..compare.compare import field_of
@@ -30,7 +28,7 @@ def field_in(
         return sources
     # Where a magnet is known, `uniform` is its flux at the tip, taken everywhere.
     known = "magnet" if run.magnet or model != "uniform" else "uniform"
-    field = field_of(step, known, run.magnet)
+    field = field_of(step, known, run.magnet, run.specimen.length_mm)
     if isinstance(field, sim.MagnetField):
         return sim.before(field.magnet)
     return field
@@ -84,9 +82,3 @@ def remanence_T(field: sim.Field) -> float:
             f"received {', '.join(one.kind for one in field.sources)}"
         )
     return float(known[0])
-
-
-def flux_at_tip_mT(field: sim.Field, length_mm: float) -> tuple[float, float]:
-    """Return size and direction (deg) of the flux at the undeformed tip."""
-    x, y, z = sim.flux_mT(field, np.array([length_mm, 0.0, 0.0]), length_mm=length_mm)
-    return float(np.linalg.norm([x, y, z])), math.degrees(math.atan2(y, x))

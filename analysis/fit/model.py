@@ -14,8 +14,9 @@ from ... import sim
 from ...core.cross_section import ALL_SIZES
 from ...core.errors import InputError
 from ...core.specimen import Section, Specimen
+from ..compare.compare import flux_at_tip_mT
 from ..compare.metrics import position_at
-from .fields import field_at, flux_at_tip_mT, is_read, strength
+from .fields import field_at, is_read, strength
 from .nuisance import Owner
 from .problem import Datum, Problem, Shot
 

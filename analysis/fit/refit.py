@@ -32,7 +32,13 @@ def with_refitted(done: RunComparison, *, theory: str = "rod") -> RunComparison:
         if model is None:
             continue
         try:
-            fit = fit_runs([done.run], model=model, support=done.support, judged=False)
+            fit = fit_runs(
+                [done.run],
+                model=model,
+                support=done.support,
+                judged=False,
+                sources=done.sources if field == "magnet" else None,
+            )
         except MagbendError as error:
             more += [
                 replace(one, moduli="refitted", status=f"no fit: {error}", errors=None)
@@ -40,7 +46,11 @@ def with_refitted(done: RunComparison, *, theory: str = "rod") -> RunComparison:
             ]
             continue
         again = compare_run(
-            done.run, specimen=fit.specimen, support=done.support, model=theory
+            done.run,
+            specimen=fit.specimen,
+            support=done.support,
+            model=theory,
+            sources=done.sources,
         )
         more += [replace(one, moduli="refitted") for one in again.of(field)]
     return replace(done, comparisons=(*done.comparisons, *more))

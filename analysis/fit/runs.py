@@ -110,9 +110,13 @@ def _check_sign(problem: Problem) -> None:
     )
 
 
-def try_fit(run: RunData, support: sim.Support | None = None) -> FitResult | str:
+def try_fit(
+    run: RunData,
+    support: sim.Support | None = None,
+    sources: sim.Field | None = None,
+) -> FitResult | str:
     """Fit one run by itself, or return the sentence that says why not."""
     try:
-        return fit_runs([run], support=support)
+        return fit_runs([run], support=support, sources=sources)
     except MagbendError as error:
         return str(error)

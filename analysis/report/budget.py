@@ -14,9 +14,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ... import sim
-from ...core.errors import MagbendError
+from ...core.errors import InputError, MagbendError
 from ...core.specimen import Specimen
-from ..compare.compare import Comparison, RunComparison, remanence_sd_T, usable_flux
+from ..compare.compare import (
+    Comparison,
+    RunComparison,
+    field_of,
+    flux_angle_deg,
+    remanence_sd_T,
+    usable_flux,
+)
 from ..fit.nuisance import FRAME_ANGLE_SD_DEG, Nuisance
 from ..fit.result import FitResult
 
@@ -130,10 +137,13 @@ def _correlated(moves: Sequence[np.ndarray], fit: FitResult) -> float:
     return math.sqrt(max(0.0, float(np.sum(stack * (correlation @ stack)))))
 
 
-def _field(run: RunComparison, last: Comparison) -> sim.UniformField | sim.MagnetField:
-    if run.magnet is not None:
-        return sim.MagnetField(magnet=run.magnet, gap_mm=last.step.gap_mm)
-    return sim.UniformField(flux_mT=last.step.flux_mT)
+def _field(run: RunComparison, last: Comparison) -> sim.Field:
+    known = run.sources or run.magnet
+    name = "uniform" if known is None else "magnet"
+    field = field_of(last.step, name, known, last.specimen.length_mm)
+    if isinstance(field, str):
+        raise InputError(f"{run.run.label}: {field}")
+    return field
 
 
 Cause = tuple[list[str], list[float], str, str]
@@ -142,7 +152,7 @@ Cause = tuple[list[str], list[float], str, str]
 def _causes(
     run: RunComparison,
     last: Comparison,
-    field: sim.UniformField | sim.MagnetField,
+    field: sim.Field,
     fit: FitResult | None,
 ) -> list[Cause]:
     specimen, a = last.specimen, ASSUMED
@@ -177,6 +187,11 @@ def _causes(
              "direction of the magnet", f"{a['axis_angle_deg']:g} deg, assumed"),
             (["gap_mm"], [a["gap_mm"]], "gap", f"{a['gap_mm']:g} mm, assumed"),
         ]  # fmt: skip
+    elif run.sources is not None:
+        if run.sources.follows_gap:
+            causes.append(
+                (["gap_mm"], [a["gap_mm"]], "gap", f"{a['gap_mm']:g} mm, assumed")
+            )
     elif usable_flux(last.step):
         sd = last.step.flux_sd_mT if math.isfinite(last.step.flux_sd_mT) else 0.5
         causes.append((["flux_mT"], [sd], "flux density", f"{sd:.2g} mT, readings"))
@@ -198,9 +213,11 @@ def _models(run: RunComparison, last: Comparison) -> list[BudgetLine]:
             kind="model",
         )
     ]
-    angle = run.magnet.axis_angle_deg if run.magnet else 90.0
+    angle = flux_angle_deg(
+        last.step, run.sources or run.magnet, last.specimen.length_mm
+    )
     others: list[tuple[str, str, sim.Solution | None]] = []
-    if usable_flux(last.step) and isinstance(field, sim.MagnetField):
+    if usable_flux(last.step) and field.uniform is None:
         uniform = sim.UniformField(flux_mT=last.step.flux_mT, angle_deg=angle)
         others.append(
             ("uniform instead of true field", "the paper's assumption",
@@ -232,7 +249,7 @@ def _models(run: RunComparison, last: Comparison) -> list[BudgetLine]:
 
 def _try(
     specimen: Specimen,
-    field: sim.UniformField | sim.MagnetField,
+    field: sim.Field,
     support: sim.Support,
     model: str,
 ) -> sim.Solution | None:

@@ -15,6 +15,7 @@ from ...core.derived import note_derived
 from ...core.errors import MagbendError, StoreError
 from ...core.files import write_bytes, write_text
 from ...core.progress import Progress, silent
+from ...sim import kinds_of
 from ..compare.compare import IMPORTED, Comparison, RunComparison, models_of
 from ..figures.fit import fit_figure
 from ..figures.run import field_figure, residual_figure, shapes_figure, step_label
@@ -223,6 +224,7 @@ def _section(
         "field": draw("field", lambda: field_figure(run)),
         "magnet_fit": run.magnet_fit,
         "magnet": run.magnet,
+        "sources": run.sources,
         "fit": _fit_context(fitted),
         "no_fit": fit if isinstance(fit, str) else "",
         "fit_figure": draw(
@@ -381,6 +383,8 @@ def _pairs(data: Any) -> str:
 
 
 def _magnet_sentence(run: RunComparison) -> str:
+    if run.sources is not None:
+        return f"{kinds_of(run.sources)}, as in the source file that was given"
     if run.magnet is None:
         return "the rig file describes no magnet"
     sides = " x ".join(f"{side:g}" for side in run.magnet.sides_mm)
