@@ -47,6 +47,13 @@ class Curve:
         np.cos(self.theta, out=normals[:, 1])
         return normals
 
+    def reversed(self) -> Curve:
+        """Return the same curve from its end on, where s is 0 less what it was."""
+        return Curve(
+            s=-self.s[::-1], points=self.points[::-1], theta=self.theta[::-1] + np.pi,
+            kappa=-self.kappa[::-1],
+        )  # fmt: skip
+
     def at(self, s: Array) -> tuple[Array, Array]:
         """Return points (n, 2) and angles (n,) at any s; beyond the ends an arc."""
         s = np.ascontiguousarray(s, dtype=np.float64)

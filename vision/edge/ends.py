@@ -161,11 +161,7 @@ def is_face(apart: float, face_px: float) -> bool:
 def _other_end(
     grey: Image, state: State, sign: float, outwards: float, reach: float
 ) -> float:
-    curve = state.curve
-    back = Curve(
-        s=-curve.s[::-1], points=curve.points[::-1], theta=curve.theta[::-1] + np.pi,
-        kappa=-curve.kappa[::-1],
-    )  # fmt: skip
+    back = state.curve.reversed()
     end = find_tip(
         grey, back, expected=outwards - state.first, width=state.width,
         blur=state.blur, reach=reach, sign=sign,

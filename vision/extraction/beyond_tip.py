@@ -26,7 +26,7 @@ PALER_TIP, TINTED_TIP = 0.12, 0.15
 """Step to either side beyond the tip, over the rod's, that a shade does not have; and
 one in the difference of two colours, over the paper's light in each."""
 
-_FAR, _ASIDE = 10.0, 2.5
+FAR, _ASIDE = 10.0, 2.5
 """How far beyond the tip another part of the rod is looked for, and how far to either
 side of straight on, in widths."""
 
@@ -82,9 +82,13 @@ def _beyond_tip(
     return quantile(step, 0.25), contrast
 
 
-def goes_on_after_gap(view: View, refined: Refined) -> bool:
-    """Whether something as wide and as dark as the rod begins again beyond its tip."""
-    curve, width = refined.fit.curve, refined.typical_width
+def goes_on_after_gap(
+    view: View, curve: Curve, width: float, *, far: float = FAR
+) -> bool:
+    """Whether something as wide and as dark as a rod begins again beyond its end.
+
+    `far` is how far beyond it is looked for, in widths.
+    """
     side = 0.5 * width + 4.0
     rod, paper = (
         median(part.ravel())
@@ -97,7 +101,7 @@ def goes_on_after_gap(view: View, refined: Refined) -> bool:
         )
     )  # fmt: skip
     grid = np.arange(-_ASIDE - 1.0, _ASIDE + 1.01, 0.125) * width
-    beyond = curve.s[-1] + np.arange(1.0, _FAR, _STEP) * width
+    beyond = curve.s[-1] + np.arange(1.0, far, _STEP) * width
     light = lanes(view.grey, curve, beyond, grid, view.sign)
     dark = light < paper - _AS_DARK * (paper - rod)
     if not dark.any():

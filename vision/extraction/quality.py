@@ -17,6 +17,7 @@ from ..find.rod import Candidate
 from ..measurement import Measurement
 from ..picture.photo import Photo
 from .beyond_tip import goes_on_after_gap, tip_goes_on
+from .body_at_end import check_ends
 from .deviations import scale_sd
 from .refine import Refined
 from .root import HIDDEN_MM, root_hidden
@@ -72,6 +73,7 @@ def refusal(view: View, refined: Refined, candidate: Candidate) -> None:
             "inconsistent",
             "the axis runs over bare paper for a while: two things may cross there",
         )
+    check_ends(view, refined)
     if length < 5.0 * width:
         raise LostError("no_rod", "what looks like a rod is shorter than five widths")
 
@@ -112,7 +114,9 @@ def doubts(
         flags.append("clamp_at_border")
     if candidate.root == "free":
         flags.append("no_clamp")
-    after_gap = not refined.rough and goes_on_after_gap(view, refined)
+    after_gap = not refined.rough and goes_on_after_gap(
+        view, refined.fit.curve, result.width_px
+    )
     if candidate.rivalled or after_gap:
         flags.append(OTHER_ROD)
     # By a tag the place may be known all the same.

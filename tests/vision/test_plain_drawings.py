@@ -1,4 +1,4 @@
-"""Hard shades in drawings by plain OpenCV: the rod is measured without them."""
+"""Drawings by plain OpenCV, not by our renderer: hard shade, and bars that cross."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from magbend.vision import as_photo, extract
 from magbend.vision.camera.calibrate import calibrate_known_length
 
 SIZE, FINE, WIDTH = (800, 500), 2, 20.0
-BLACK, RED = (0.025, 0.025, 0.025), (0.05, 0.04, 0.45)
+BLACK, RED, GREEN = (0.025,) * 3, (0.05, 0.04, 0.45), (0.06, 0.25, 0.05)
 ROOT = np.array([200.0, 240.0])
 CLAMP = ROOT + np.array([[0, 90], [0, -90], [-110, -90], [-110, 90]])
 SCALE = calibrate_known_length(
@@ -31,18 +31,21 @@ def axis(turn_deg, length=400.0):
     return ROOT + np.cumsum(step, axis=0), theta
 
 
-def drawn(*, rod, turn_deg, shade_px, deep, clamp=0.2, clamp_shade=1.8):
-    """Return a photograph of a rod whose shade is moved by `shade_px`."""
+def drawn(*, rod, turn_deg, shade_px=(0, 0), deep=0.0, clamp=0.2, over=()):
+    """Return a photograph of a rod whose shade is moved by `shade_px`.
+
+    `over` are pairs of a colour and corners, drawn over all else.
+    """
     points, theta = axis(turn_deg)
     aside = 0.5 * WIDTH * np.column_stack([-np.sin(theta), np.cos(theta)])
     body = np.vstack([points + aside, (points - aside)[::-1]])
     moved = np.asarray(shade_px, float)
-    both = np.vstack([CLAMP, CLAMP + clamp_shade * moved]).astype(np.float32)
+    both = np.vstack([CLAMP, CLAMP + 1.8 * moved]).astype(np.float32)
     shade = np.maximum(
         covered(body + moved), covered(cv2.convexHull(both)[:, 0].astype(float))
     )
     light = np.full((SIZE[1], SIZE[0], 3), 0.7) * (1.0 - deep * shade)
-    for colour, corners in ((rod, body), ((clamp,) * 3, CLAMP)):
+    for colour, corners in ((rod, body), ((clamp,) * 3, CLAMP), *over):
         light += (np.array(colour) - light) * covered(corners)
     light = cv2.GaussianBlur(light, (0, 0), 1.0)
     light += np.random.default_rng(3).normal(0.0, 0.004, light.shape)
@@ -56,9 +59,11 @@ def measured(**what):
     return found
 
 
-@pytest.mark.parametrize("shade_px", [(10, 2), (11, 9), (8, 30)])
-def test_the_front_of_a_clamps_shade_is_not_the_clamp(shade_px):
-    found = measured(rod=RED, turn_deg=25.0, shade_px=shade_px, deep=0.55)
+@pytest.mark.parametrize(
+    ("shade_px", "clamp"), [((10, 2), 0.05), ((11, 9), 0.05), ((8, 30), 0.2)]
+)
+def test_the_front_of_a_clamps_shade_is_not_the_clamp(shade_px, clamp):
+    found = measured(rod=RED, turn_deg=25.0, shade_px=shade_px, deep=0.55, clamp=clamp)
     assert abs(found.clamp_px[0] - ROOT[0]) < 1.5
     assert abs(found.length_mm - 20.0) < 0.08
 
@@ -76,3 +81,28 @@ def test_a_black_rod_ends_before_its_deep_shade():
     shade_px = (12.0 * np.cos(np.radians(40.0)), 12.0 * np.sin(np.radians(40.0)))
     found = measured(rod=BLACK, turn_deg=40.0, shade_px=shade_px, deep=0.69)
     assert np.hypot(*(found.tip_px - axis(40.0)[0][-1])) < 1.0
+
+
+def bar(at, angle_deg, length, width):
+    """Return the corners of a bar about a point."""
+    t = np.radians(angle_deg)
+    along, aside = np.array([np.cos(t), np.sin(t)]), np.array([-np.sin(t), np.cos(t)])
+    corners = 0.5 * np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]])
+    return at + corners @ np.array([length * along, width * aside])
+
+
+@pytest.mark.parametrize("clamp", [0.3, 0.42])
+def test_a_bar_over_a_rod_is_not_its_clamp(clamp):
+    points, theta = axis(45.0)
+    across = np.degrees(theta[150]) + 65.0
+    over = ((0.05,) * 3, bar(points[150], across, 200, 30))
+    photo = drawn(rod=RED, turn_deg=45.0, clamp=clamp, over=[over])
+    assert not extract(photo, SCALE, rod_height_mm=0.0).ok
+
+
+def test_a_wire_that_crosses_a_rod_does_not_grow_from_it():
+    points, theta = axis(-100.0)
+    across = np.degrees(theta[316]) + 60.0
+    over = ((0.14,) * 3, bar(points[316], across, 420, 12.4))
+    photo = drawn(rod=GREEN, turn_deg=-100.0, over=[over])
+    assert not extract(photo, SCALE, rod_height_mm=0.0).ok
