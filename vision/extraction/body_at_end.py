@@ -96,7 +96,11 @@ def _paper_beside(
     """Return a quantile of the light beside a stretch of the rod, and the contrast."""
     paper = quantile(_beside(view, refined, s).ravel(), part)
     inside = lanes(
-        view.grey, refined.fit.curve, np.linspace(*s, 15), np.zeros(1), view.sign
+        view.grey,
+        refined.fit.curve,
+        np.linspace(s[0], s[-1], 15),
+        np.zeros(1),
+        view.sign,
     )
     return paper, paper - median(inside.ravel())
 
@@ -107,5 +111,5 @@ def _beside(view: View, refined: Refined, s: Array) -> Array:
     far = max(away + 2.0, _WIDE * refined.typical_width)
     across = np.concatenate([np.linspace(-far, -away, 3), np.linspace(away, far, 3)])
     curve = refined.fit.curve
-    light = lanes(view.grey, curve, np.linspace(*s, 15), across, view.sign)
+    light = lanes(view.grey, curve, np.linspace(s[0], s[-1], 15), across, view.sign)
     return light.reshape(2, -1)

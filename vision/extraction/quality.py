@@ -35,8 +35,9 @@ SCALE = 5e-4
 
 TIP_GOES_ON, OTHER_ROD = "tip_goes_on", "other_rod"
 
-OVER_PAPER, BARE = 1.0, 0.6
-"""Widths of bare paper under an axis that are more than a speck, and its light."""
+OVER_PAPER, OVER_PAPER_ROUGH, BARE = 1.0, 3.0, 0.6
+"""Widths of bare paper under an axis that are more than a speck, or than a gap in a
+yarn; and its light."""
 
 BLURRED_PX, BLURRED = 1.8, 0.08
 """Blur that is named: the lens is out of focus, or something moved; px and widths."""
@@ -68,7 +69,8 @@ def refusal(view: View, refined: Refined, candidate: Candidate) -> None:
         )
     if refined.fit.noise > 0.25 * width:
         raise LostError("inconsistent", "the edges of the rod lie on no smooth curve")
-    if _over_paper(view, refined) > OVER_PAPER * width:
+    bare = OVER_PAPER_ROUGH if refined.rough else OVER_PAPER
+    if _over_paper(view, refined) > bare * width:
         raise LostError(
             "inconsistent",
             "the axis runs over bare paper for a while: two things may cross there",
@@ -80,8 +82,8 @@ def refusal(view: View, refined: Refined, candidate: Candidate) -> None:
 
 def _over_paper(view: View, refined: Refined) -> float:
     """Return how far the axis runs at a stretch over paper, without edges, px."""
-    if refined.rough or refined.good.all():
-        return 0.0  # a yarn has gaps
+    if refined.good.all():
+        return 0.0
     width, curve = refined.typical_width, refined.fit.curve
     across = np.array([-0.5 * width - 4.0, -0.4 * width, 0.0, 0.4 * width])
     beside, *inside = lanes(view.grey, curve, curve.s, across, view.sign)
