@@ -1,4 +1,4 @@
-"""Drawings by plain OpenCV, not by our renderer: hard shade, and bars that cross."""
+"""Drawings by plain OpenCV, not by our renderer: hard shade, gloss, bars that cross."""
 
 from __future__ import annotations
 
@@ -31,14 +31,19 @@ def axis(turn_deg, length=400.0):
     return ROOT + np.cumsum(step, axis=0), theta
 
 
+def strip(turn_deg, low, high):
+    """Return the corners of what lies along a rod between two offsets, in widths."""
+    points, theta = axis(turn_deg)
+    aside = WIDTH * np.column_stack([-np.sin(theta), np.cos(theta)])
+    return np.vstack([points + low * aside, (points + high * aside)[::-1]])
+
+
 def drawn(*, rod, turn_deg, shade_px=(0, 0), deep=0.0, clamp=0.2, over=()):
     """Return a photograph of a rod whose shade is moved by `shade_px`.
 
     `over` are pairs of a colour and corners, drawn over all else.
     """
-    points, theta = axis(turn_deg)
-    aside = 0.5 * WIDTH * np.column_stack([-np.sin(theta), np.cos(theta)])
-    body = np.vstack([points + aside, (points - aside)[::-1]])
+    body = strip(turn_deg, -0.5, 0.5)
     moved = np.asarray(shade_px, float)
     both = np.vstack([CLAMP, CLAMP + 1.8 * moved]).astype(np.float32)
     shade = np.maximum(
@@ -106,3 +111,13 @@ def test_a_wire_that_crosses_a_rod_does_not_grow_from_it():
     over = ((0.14,) * 3, bar(points[316], across, 420, 12.4))
     photo = drawn(rod=GREEN, turn_deg=-100.0, over=[over])
     assert not extract(photo, SCALE, rod_height_mm=0.0).ok
+
+
+@pytest.mark.parametrize("at", [0.0, 0.1, -0.22])
+def test_a_streak_of_gloss_all_along_leaves_one_rod(at):
+    gloss = ((0.65,) * 3, strip(50.0, at - 0.1, at + 0.1))
+    found = measured(rod=BLACK, turn_deg=50.0, over=[gloss])
+    truth, _ = axis(50.0)
+    away = [np.hypot(*(truth - point).T).min() for point in found.points_px[:-1]]
+    assert max(away) < 1.0
+    assert found.width_px == pytest.approx(WIDTH, rel=0.06)

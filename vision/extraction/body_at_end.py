@@ -6,6 +6,8 @@ rod was found, leaves only a part of the rod, or turns it round.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,7 @@ from ..edge.edges import clear_of
 from ..edge.state import LostError
 from ..edge.step_line import lanes
 from ..find.ground import View
+from ..picture.photo import Photo
 from .beyond_tip import goes_on_after_gap
 from .refine import Refined
 
@@ -38,8 +41,11 @@ _AS_DARK, _EVEN = 0.3, 0.2
 """A body at a tip is darker than the paper by more than this share, all across."""
 
 
-def check_ends(view: View, refined: Refined) -> None:
+def check_ends(photo: Photo, view: View, refined: Refined) -> None:
     """Refuse a rod in a clamp whose root is on bare paper, or whose tip meets a body.
+
+    A clamp may be as light as the paper in the mix of colours that tells the rod best,
+    or in lightness, but hardly in both.
 
     Raises
     ------
@@ -48,7 +54,8 @@ def check_ends(view: View, refined: Refined) -> None:
     """
     if refined.clamp is None or refined.rough:
         return
-    if _on_paper(view, refined):
+    views = (view, replace(view, grey=photo.grey))
+    if all(_on_paper(each, refined) for each in views[: 1 if view.mix is None else 2]):
         raise LostError(
             "no_clamp",
             "what looks like a rod begins on bare paper: no clamp is seen there",

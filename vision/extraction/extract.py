@@ -26,6 +26,7 @@ from .quality import OTHER_ROD, TIP_GOES_ON, doubts, refusal
 from .refine import Refined, refine
 from .setting import Setting
 from .specimen_frame import measurement
+from .streak import whole_rod
 from .two_levels import rod_alone
 
 Array = NDArray[np.float64]
@@ -163,6 +164,7 @@ def measure_candidate(
     LostError
         If there is nothing to vouch for.
     """
+    view, candidate = whole_rod(view, candidate)
     grey, sign = view.grey, view.sign
     start = _start(grey, candidate, sign)
     alone = None if start.rough else rod_alone(view, start, candidate)
@@ -202,7 +204,7 @@ def finish(
     refined = _refined(view, start, candidate, setting, sd_px)
     if np.isfinite(sd_px) and not refined.settled:
         raise LostError("edges_lost", "the rod moved too far since the last frame")
-    refusal(view, refined, candidate)
+    refusal(photo, view, refined, candidate)
     result = measurement(refined, view, setting, _told(photo, setting))
     result = replace(result, inverted=view.sign < 0.0, mix=view.mix)
     return doubts(result, photo, view, refined, candidate, setting)

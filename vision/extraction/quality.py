@@ -46,7 +46,7 @@ SHADE_PX = 0.04
 """Pull of a shade on the midline, before correction, above which it is named."""
 
 
-def refusal(view: View, refined: Refined, candidate: Candidate) -> None:
+def refusal(photo: Photo, view: View, refined: Refined, candidate: Candidate) -> None:
     """Refuse a refined rod that contradicts what was found at first.
 
     Raises
@@ -75,7 +75,7 @@ def refusal(view: View, refined: Refined, candidate: Candidate) -> None:
             "inconsistent",
             "the axis runs over bare paper for a while: two things may cross there",
         )
-    check_ends(view, refined)
+    check_ends(photo, view, refined)
     if length < 5.0 * width:
         raise LostError("no_rod", "what looks like a rod is shorter than five widths")
 

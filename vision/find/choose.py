@@ -39,6 +39,10 @@ _SHADE, _BESIDE = 0.65, 8.0
 """Contrast of a shade over that of its rod, at most; and how far it may lie from the
 rod, in widths."""
 
+_HALVES = 2.5
+"""Distance between the axes of two halves of a rod that a streak of gloss parts, at
+most, in widths of the wider, as far as that is known yet."""
+
 _SHOWN = 6
 """Things that are drawn on the overlay of a refusal."""
 
@@ -130,7 +134,8 @@ def search_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
         for other in things
         if _rivals(first, other) and not _is_shade(other.best, first.best)
     ]
-    rod = replace(first.best, rivalled=bool(rivals))
+    halved = any(_are_halves(first.best, other.best) for other in things)
+    rod = replace(first.best, rivalled=bool(rivals), halved=halved)
     alike = [other for other in rivals if other.length_px > _AS_LONG * rod.length_px]
     if alike:
         raise _too_many([rod, *alike], seen)
@@ -161,6 +166,16 @@ def _is_shade(one: Candidate, rod: Candidate) -> bool:
     return alike and max(away) < _BESIDE * rod.width_px
 
 
+def _are_halves(one: Candidate, other: Candidate) -> bool:
+    """Whether two things lie so close along each other as halves of one rod do."""
+    if one.points_px is other.points_px or one.lies_on(other):
+        return False
+    away = np.array([one.away(point) for point in other.points_px])
+    close = _HALVES * max(one.width_px, other.width_px)
+    alike = 0.8 < one.length_px / other.length_px < 1.25
+    return alike and bool(np.quantile(away, 0.9) < close)
+
+
 def _too_many(rods: list[Candidate], seen: list[Array]) -> LostError:
     if len(rods) == 2:
         return LostError(
@@ -183,6 +198,7 @@ def _rivals(first: Thing, other: Thing) -> bool:
     one, two = first.best, other.best
     return (
         not two.lies_on(one)
+        and not _are_halves(one, two)
         and 0.5 < two.width_px / one.width_px < 2.0
         and two.length_px > 0.4 * one.length_px
         and (one.root != "clamp" or two.root == "clamp")
@@ -203,6 +219,7 @@ def _choose(binary: Binary, sought: Sought) -> Candidate:
             continue
         rod = _likeliest(rods)
         _refuse_second(rod, rods)
+        rod = replace(rod, halved=any(_are_halves(rod, other) for other in rods))
         # What shows only where less is dark may be the clamp's shade: seek its root.
         alike = best is None or best.lies_on(rod)
         if rod.root != "free" and alike:
@@ -252,6 +269,7 @@ def _refuse_second(first: Candidate, rods: list[Candidate]) -> None:
         and other.length_px > 0.4 * first.length_px
         and other.ratio < first.ratio + _PALER
         and (first.root != "clamp" or other.root == "clamp")
+        and not _are_halves(first, other)
     ]
     if alike:
         rods = [first, *alike]

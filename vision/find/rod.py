@@ -63,6 +63,8 @@ class Candidate:
         Light on it relative to the background.
     rivalled : bool
         Whether another thing in the picture may be the rod as well.
+    halved : bool
+        Whether another thing lies so close along it that both may be one rod.
     """
 
     points_px: Array
@@ -73,6 +75,7 @@ class Candidate:
     ratio: float
     leaves: bool = False
     rivalled: bool = False
+    halved: bool = False
 
     @property
     def slenderness(self) -> float:
