@@ -1,4 +1,4 @@
-"""Drawings by plain OpenCV, not by our renderer: hard shade, gloss, bars that cross."""
+"""Drawings by plain OpenCV, not by our renderer: shade, gloss, bars, pale rods."""
 
 from __future__ import annotations
 
@@ -121,3 +121,22 @@ def test_a_streak_of_gloss_all_along_leaves_one_rod(at):
     away = [np.hypot(*(truth - point).T).min() for point in found.points_px[:-1]]
     assert max(away) < 1.0
     assert found.width_px == pytest.approx(WIDTH, rel=0.06)
+
+
+def test_of_two_rods_in_a_clamp_the_known_length_tells_which():
+    points, theta = axis(30.0)
+    aside = 0.5 * WIDTH * np.column_stack([-np.sin(theta), np.cos(theta)])[:280]
+    beside = points[:280] + np.array([0.0, 60.0])
+    second = (BLACK, np.vstack([beside + aside, (beside - aside)[::-1]]))
+    photo = drawn(rod=BLACK, turn_deg=30.0, over=[second])
+    assert "two_rods" in extract(photo, SCALE, rod_height_mm=0.0).flags
+    for length_mm in (20.0, 14.0):
+        found = extract(photo, SCALE, rod_height_mm=0.0, length_mm=length_mm)
+        assert found.ok, found.reason
+        assert found.length_mm == pytest.approx(length_mm, abs=0.1)
+
+
+def test_a_rod_nearly_as_light_as_its_paper_is_found():
+    found = measured(rod=(0.57,) * 3, turn_deg=30.0)
+    assert found.length_mm == pytest.approx(20.0, abs=0.1)
+    assert found.width_px == pytest.approx(WIDTH, rel=0.05)

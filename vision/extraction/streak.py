@@ -89,7 +89,7 @@ def whole_rod(view: View, candidate: Candidate) -> tuple[View, Candidate]:
     normals = np.column_stack([-np.sin(theta), np.cos(theta)])
 
     def along(offset: Array) -> Array:
-        return points + np.interp(s, at, offset)[:, None] * normals
+        return np.asarray(points + np.interp(s, at, offset)[:, None] * normals)
 
     offsets = np.array([low, first, last, high])
     grey = _painted(view, curve, at, offsets, median(dark))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from ..edge.state import LostError
 from ..picture.photo import Photo
 from .binarise import Binary, binarise, rebinarise
-from .ground import LEVELS, View, best_view, ground_distance
+from .ground import FAINT, LEVELS, View, best_view, ground_distance
 from .rod import LEAST_SHARE, Candidate, find_candidates
 from .things import Thing, find_things
 
@@ -24,6 +25,9 @@ _NO_CLAMP = (
 )
 _SIZE = 1.6
 """Factor by which a thing may be larger or smaller than the rod that is sought."""
+
+_TOLD = 0.2
+"""By how much better, as a logarithm, a rod of known size must fit than another."""
 
 _AS_CLEAR = 0.6
 """Share of the levels, and of the worth, at which another thing is as likely."""
@@ -79,6 +83,15 @@ class Sought:
             not self.length_px or 1 / _SIZE < length / self.length_px < _SIZE
         )
 
+    def misfit(self, rod: Candidate) -> float:
+        """How far a candidate's size is from the rod's, as logarithms; 0 if unknown."""
+        pairs = ((rod.width_px, self.width_px), (rod.length_px, self.length_px))
+        return sum(abs(math.log(seen / known)) for seen, known in pairs if known)
+
+    def tells(self, rod: Candidate, other: Candidate) -> bool:
+        """Whether the size tells that it is this candidate and not another."""
+        return self.misfit(rod) + _TOLD < self.misfit(other)
+
 
 def find_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
     """Return the rod as one level of lightness shows it: quick, and enough for most.
@@ -119,6 +132,8 @@ def search_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
     binary = ground_distance(photo)
     least = LEAST_LENGTH * binary.factor * float(np.hypot(*binary.mask.shape))
     things = find_things(binary, [1.0 - level for level in LEVELS], least)
+    if not things:
+        things = find_things(binary, [1.0 - level for level in FAINT], least)
     if sought.width_px or sought.length_px:
         things = [thing for thing in things if sought.fits(thing.best)] or things
     if not things:
@@ -129,10 +144,13 @@ def search_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
         for thing in things
         if not any(_is_shade(thing.best, other.best) for other in things)
     )
+    first = min(
+        [first, *_all_rivals(first, things)], key=lambda item: sought.misfit(item.best)
+    )
     rivals = [
         other.best
-        for other in things
-        if _rivals(first, other) and not _is_shade(other.best, first.best)
+        for other in _all_rivals(first, things)
+        if not sought.tells(first.best, other.best)
     ]
     halved = any(_are_halves(first.best, other.best) for other in things)
     rod = replace(first.best, rivalled=bool(rivals), halved=halved)
@@ -193,6 +211,15 @@ def _too_many(rods: list[Candidate], seen: list[Array]) -> LostError:
     )
 
 
+def _all_rivals(first: Thing, things: list[Thing]) -> list[Thing]:
+    """Return the things that could as well be the rod, and are not its shade."""
+    return [
+        other
+        for other in things
+        if _rivals(first, other) and not _is_shade(other.best, first.best)
+    ]
+
+
 def _rivals(first: Thing, other: Thing) -> bool:
     """Whether another thing could as well be the rod: of its size, held as it is."""
     one, two = first.best, other.best
@@ -218,7 +245,11 @@ def _choose(binary: Binary, sought: Sought) -> Candidate:
         if not rods:
             continue
         rod = _likeliest(rods)
-        _refuse_second(rod, rods)
+        rod = min([rod, *_alike(rod, rods)], key=sought.misfit)
+        alike = [other for other in _alike(rod, rods) if not sought.tells(rod, other)]
+        if alike:
+            seen = [item.points_px for item in [rod, *alike][:_SHOWN]]
+            raise _too_many([rod, *alike], seen)
         rod = replace(rod, halved=any(_are_halves(rod, other) for other in rods))
         # What shows only where less is dark may be the clamp's shade: seek its root.
         alike = best is None or best.lies_on(rod)
@@ -260,8 +291,9 @@ def _likeliest(rods: list[Candidate]) -> Candidate:
     return clamped[0] if clamped else thick[0]
 
 
-def _refuse_second(first: Candidate, rods: list[Candidate]) -> None:
-    alike = [
+def _alike(first: Candidate, rods: list[Candidate]) -> list[Candidate]:
+    """Return what could as well be the rod, by its size and how it is held."""
+    return [
         other
         for other in rods
         if other is not first
@@ -271,9 +303,6 @@ def _refuse_second(first: Candidate, rods: list[Candidate]) -> None:
         and (first.root != "clamp" or other.root == "clamp")
         and not _are_halves(first, other)
     ]
-    if alike:
-        rods = [first, *alike]
-        raise _too_many(rods, [rod.points_px for rod in rods[:_SHOWN]])
 
 
 def _accept(rod: Candidate) -> Candidate:

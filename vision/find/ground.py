@@ -25,6 +25,9 @@ LEVELS = (0.62, 0.5, 0.4, 0.32, 0.25, 0.19, 0.14, 0.1, 0.07)
 """Distances from the paper at which things are looked at: black on white is 0.7 to 0.9,
 deep shade 0.3, and the fibres of paper 0.02."""
 
+FAINT = (0.1, 0.085, 0.07, 0.055, 0.045)
+"""The same for what is nearly as light as the paper, where nothing else is seen."""
+
 _SAMPLE = 1500
 _FALLS_OFF, _GRAIN = 0.4, 0.006
 """Pixels that tell the paper's light; by how much it may fall off across the picture,
