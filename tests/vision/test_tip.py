@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.special import erf
+from scipy.special import erf, ndtr
 
 from magbend.vision import Pose, as_photo, extract
 from magbend.vision.edge.clamp import ClampLines, between
@@ -16,6 +16,7 @@ from magbend.vision.edge.step_line import (
     fit_step,
     line_through,
 )
+from magbend.vision.edge.tip import _rough_end
 from magbend.vision.synthetic import (
     Block,
     Scene,
@@ -127,3 +128,16 @@ def test_a_tip_before_its_own_deep_shade_is_not_the_end_of_the_shade():
     )  # fmt: skip
     assert found.ok, found.reason
     assert found.length_mm == pytest.approx(20.0, abs=0.06)
+
+
+def test_a_paler_tail_is_no_shade_but_a_level_step_is():
+    """Rod 0, shade 0.28, paper 1; the end is looked for about s = 0, blur 1 px."""
+    s = np.arange(-30.0, 20.0, 0.5)
+
+    def place(light):
+        return _rough_end(light, s, 0.0, 12.0, 2.2, 8.0, 0.0)
+
+    tail = np.clip((s + 20.0) / 36.0, 0.0, 1.0)
+    assert place(tail) == pytest.approx(-2.0, abs=0.6)
+    step = 0.28 * ndtr(s + 8.0) + 0.72 * ndtr(s - 6.0)
+    assert place(step) == pytest.approx(-8.0, abs=0.6)

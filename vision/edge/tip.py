@@ -122,6 +122,8 @@ def _rough_end(
     end = float(s[hits[0]])
     dark = np.flatnonzero((light < _SHADE) & within & (s < end))
     shade = float(s[dark[-1] + 1] if dark.size else s[within][0])
+    if light[np.searchsorted(s, shade - near)] > 0.5 * _SHADE:
+        return end  # paler little by little, as a tail that tapers: no shade
     if face is None:
         soft = _SOFTER * _rise(light, s, end) < _rise(light, s, shade)
         face = 0.0 if soft else inner

@@ -246,10 +246,10 @@ def _choose(binary: Binary, sought: Sought) -> Candidate:
             continue
         rod = _likeliest(rods)
         rod = min([rod, *_alike(rod, rods)], key=sought.misfit)
-        alike = [other for other in _alike(rod, rods) if not sought.tells(rod, other)]
-        if alike:
-            seen = [item.points_px for item in [rod, *alike][:_SHOWN]]
-            raise _too_many([rod, *alike], seen)
+        others = [other for other in _alike(rod, rods) if not sought.tells(rod, other)]
+        if others:
+            seen = [item.points_px for item in [rod, *others][:_SHOWN]]
+            raise _too_many([rod, *others], seen)
         rod = replace(rod, halved=any(_are_halves(rod, other) for other in rods))
         # What shows only where less is dark may be the clamp's shade: seek its root.
         alike = best is None or best.lies_on(rod)
