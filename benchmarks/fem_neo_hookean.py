@@ -2,7 +2,7 @@
 
     python benchmarks/fem_neo_hookean.py --gmc 2 --flux-mT 50 --angle-deg 90
     python benchmarks/fem_neo_hookean.py --specimen rod.toml --gap-mm 60 --weight
-    python benchmarks/fem_neo_hookean.py --seed 7
+    python benchmarks/fem_neo_hookean.py --seed 7 --shape tube
 
 Each takes a minute or some. Q2 displacements and linear discontinuous pressure
 (condensed in each element) on hexahedra: a mesh of the section (square, rectangular,
@@ -306,6 +306,7 @@ def arguments():
     parser.add_argument("--gmc", type=int, help="rod of Table 1")
     parser.add_argument("--specimen", type=Path, help="specimen file")
     parser.add_argument("--seed", type=int, help="draw the case instead")
+    parser.add_argument("--shape", help="its shape, if not that of the seed")
     parser.add_argument("--flux-mT", type=float)
     parser.add_argument("--angle-deg", type=float, default=90.0)
     parser.add_argument("--gap-mm", type=float, help="before the 55 mm cube instead")
@@ -317,7 +318,7 @@ def arguments():
     parser.add_argument("--out", type=Path, help="write axis and case beside fixtures")
     given = parser.parse_args()
     if given.seed is not None:
-        return (*draw(given.seed), given)
+        return (*draw(given.seed, given.shape), given)
     rod = gmc(given.gmc) if given.gmc else read_specimen(given.specimen)
     if given.from_tip:
         rod = replace(rod, remanence_mT=-rod.remanence_mT)

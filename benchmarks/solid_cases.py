@@ -53,6 +53,9 @@ def _rod(rng, shape):
         sizes = {"side_mm": size}
     elif shape == "round":
         sizes = {"diameter_mm": size}
+    elif shape == "tube":
+        bore = float(np.round(size * rng.uniform(0.2, 0.6), 3))
+        sizes = {"diameter_mm": size, "bore_mm": bore}
     else:
         ratio = np.exp(rng.uniform(-1.0, 1.0) * np.log(2.5))
         sizes = {"width_mm": float(np.round(size * ratio**0.5, 3)),

@@ -44,6 +44,8 @@ class SolidConstants:
         Increase of curvature per x^2 at a given moment.
     stiff : tuple of float
         s in the energy's sixth order, E A (s_1 x_1^2 + s_2 x_2^2)^3 / 6.
+    soften_twist : float
+        The same of torsion: increase of twist per x_3^2 at a given moment.
     cross : tuple of float
         c in the energy E A c x_i^2 x_j^2 / 2 of the pairs 12, 13, 23.
     twisted_shear : tuple of float
@@ -55,6 +57,10 @@ class SolidConstants:
         shift kappa(0) of a size squared.
     twist_turn : float
         As `turn`, of torsion: a fixed face cannot warp.
+    turn_cubed : tuple of float
+        Increase of the turn, per x^3.
+    turn_mixed : float
+        c in the energy E A sqrt(height width) c x_1 x_2 x_3 of a fixed face.
     """
 
     shear: float
@@ -63,6 +69,7 @@ class SolidConstants:
     tension_twice: float
     bending_twice: float
     soften: tuple[float, float]
+    soften_twist: float
     stiff: tuple[float, float]
     cross: tuple[float, float, float]
     twisted_shear: tuple[float, float]
@@ -70,6 +77,8 @@ class SolidConstants:
     turn: tuple[float, float]
     shift: tuple[float, float]
     twist_turn: float
+    turn_cubed: tuple[float, float]
+    turn_mixed: float
 
 
 def solid_constants(across: CrossSection, poisson_ratio: float) -> SolidConstants:
@@ -78,7 +87,8 @@ def solid_constants(across: CrossSection, poisson_ratio: float) -> SolidConstant
     Parameters
     ----------
     across : CrossSection
-        Square, round, or a rectangle of sides at most 3 to 1.
+        Square, round, a rectangle of sides at most 3 to 1, or a tube of a bore of at
+        most 0.6 of its diameter.
     poisson_ratio : float
         From 0 to 0.5.
 
@@ -106,6 +116,7 @@ def solid_constants(across: CrossSection, poisson_ratio: float) -> SolidConstant
         tension_twice=fibre,
         bending_twice=(31.0 - nu * (6.0 - nu * (228.0 - nu * 320.0))) / 9.0,
         soften=(aside["soften"], ahead["soften"]),
+        soften_twist=ahead["soften_twist"],
         stiff=(aside["stiff"], ahead["stiff"]),
         cross=(ahead["cross_bending"], aside["cross_torsion"], ahead["cross_torsion"]),
         twisted_shear=(aside["twisted_shear"], ahead["twisted_shear"]),
@@ -113,6 +124,8 @@ def solid_constants(across: CrossSection, poisson_ratio: float) -> SolidConstant
         turn=(aside["turn"], ahead["turn"]),
         shift=(aside["shift"], ahead["shift"]),
         twist_turn=ahead["twist_turn"],
+        turn_cubed=(aside["turn_cubed"], ahead["turn_cubed"]),
+        turn_mixed=ahead["turn_mixed"],
     )
 
 
@@ -144,12 +157,13 @@ def _place(across: CrossSection) -> tuple[str, float]:
                 "'rod'"
             )
         return "rectangle", math.log(ratio)
-    if across.bore_mm == 0.0:
-        return "round", 0.0
-    raise InputError(
-        "the solid model takes no tubes; instead received one of bore "
-        f"{across.bore_mm:g} mm: use model 'rod'"
-    )
+    bore = across.bore_mm / across.width_mm
+    if bore > 0.6:
+        raise InputError(
+            "the solid model takes tubes of bores to 0.6 of the diameter; instead "
+            f"received {across.bore_mm:g} mm of {across.width_mm:g} mm: use model 'rod'"
+        )
+    return "round", bore**2
 
 
 def _interpolated(family: str, place: float, nu: float) -> dict[str, float]:

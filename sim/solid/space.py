@@ -22,11 +22,6 @@ from .constants import SolidConstants, joint_share, solid_constants
 
 Array = NDArray[np.float64]
 
-END_CUBIC = {True: (0.0195, 0.0), False: (0.022, 0.048)}
-"""Turn of a fixed face per cube of the linear strain x, at Poisson's ratio 0 and per
-ratio, of round sections and of others: fits neo-Hookean finite elements of a dozen rods
-at strains of 0.1 to 0.2."""
-
 
 def solve_in_space(
     specimen: Specimen, field: Field, support: Support, poisson_ratio: float,
@@ -95,11 +90,12 @@ def solid_tables(
     for i, row in enumerate(table):
         E_MPa = specimen.sections[i].E_MPa
         ends = []
-        for k in (i - 1, i + 1):
+        for side in (-1, 1):
+            k = i + side
             share = 1.0 if k < 0 else 0.0
             if 0 <= k <= last and sections[k] == sections[i]:
                 share = joint_share(min(E_MPa / specimen.sections[k].E_MPa, 1.0))
-            ends.append(_end(row, sections[i], found[i], share, poisson_ratio, L))
+            ends.append(_end(row, sections[i], found[i], share, side, L))
         pieces = _with_ends(row, ends[0], ends[1], specimen.sections[i].length_mm)
         rows += pieces
         shown += [row] * len(pieces)
@@ -125,6 +121,7 @@ def _write_law(
     row[law.P11 : law.P22 + 1] = constants.soften * radii * sizes[:2]
     pairs = sizes[[0, 0, 1]] * sizes[[1, 2, 2]]
     row[law.P12 : law.P23 + 1] = constants.cross * pairs
+    row[law.P33] = constants.soften_twist * row[law.R3] * sizes[2]
     row[law.S1 : law.S2 + 1] = constants.stiff * sizes[:2]
     corner = np.sqrt(radii) if across.is_round else np.array([w, h]) / math.sqrt(12.0)
     row[law.FACE1], row[law.FACE2] = corner
@@ -132,20 +129,21 @@ def _write_law(
 
 def _end(
     row: Array, across: CrossSection, constants: SolidConstants, share: float,
-    poisson_ratio: float, L: float,
+    side: int, L: float,
 ) -> Array | None:  # fmt: skip
     """Return the stiffer piece at an end of a section, or None.
 
-    `share` is how much of a fixed face's turn it has. The piece is so long that its
+    `share` is how much of a fixed face's turn it has; `side` is -1 at the root's end,
+    1 at the tip's, whose twist is the other way round. The piece is so long that its
     turn acts where it brings the tip to the right place: 0.4 of the shift, since a
     shear force at the face turns the rod a little less than the shift by a moment
     would have it.
     """
+    if share == 0.0:
+        return None
     sizes = np.array([across.height_mm, across.width_mm]) / L
     turn, shift = np.array(constants.turn), np.array(constants.shift)
     turns = np.append(turn * sizes, constants.twist_turn * sizes.prod() ** 0.5)
-    if share == 0.0:
-        return None
     lengths = np.minimum(0.8 * shift, turn) / np.where(turn > 0.0, turn, 1.0)
     piece = row.copy()
     piece[H] = max(*(np.where(turn > 0.0, lengths, 1.0) * sizes), 1.25 * turns[2])
@@ -153,10 +151,16 @@ def _end(
     piece[C1 : C3 + 1] *= left
     piece[law.R1 : law.R3 + 1] /= left
     softens = row[law.P11 : law.P22 + 1] / row[law.R1 : law.R2 + 1]
-    at_zero, per_ratio = END_CUBIC[across.is_round]
-    cubic = share * (at_zero + per_ratio * poisson_ratio)
-    bends = (softens - cubic * sizes**3 / piece[H]) / left[:2] ** 3
+    cubic = share * np.array(constants.turn_cubed) * sizes**3 / piece[H]
+    bends = (softens - cubic) / left[:2] ** 3
     piece[law.P11 : law.P22 + 1] = bends * piece[law.R1 : law.R2 + 1]
+    if across.is_round:  # bent about any axis alike
+        piece[law.P12] = piece[law.P11]
+    # What three turns one after the other do already depends on the piece's length.
+    stiff = row[law.R1 : law.R3 + 1] / row[law.T]
+    own = 0.5 * piece[H] * stiff @ (np.roll(turns, -1) - np.roll(turns, 1))
+    mixed = sizes.prod() ** 2 / row[law.T] * constants.turn_mixed - own
+    piece[law.D] = -side * share * mixed / (piece[H] * left.prod())
     return piece
 
 

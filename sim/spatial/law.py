@@ -10,8 +10,9 @@ that work is conserved:
     eps       = e + NU e^2 / 2 + sum_i (alpha_i / 2 + beta_i e) r_i^2 k_i^2 + U V / 4
     gamma_i   = G_i Q_i + M_i k_i k_3,    U = sum A_i k_i^2,    V = sum B_i k_i^2
 
-and by the last term curvatures gain C_i M_i Q_i k_3, and twist C_3 sum M_i Q_i k_i.
-There r_i^2 is the stiffness of k_i over that of e. Dimensionless as `spatial.march`.
+and by the last term curvatures gain C_i M_i Q_i k_3, and twist C_3 sum M_i Q_i k_i; by
+D k_1 k_2 k_3 in the energy, which only ends have, each gains C_i D k_j k_l. There r_i^2
+is the stiffness of k_i over that of e. Dimensionless as `spatial.march`.
 """
 
 from __future__ import annotations
@@ -26,11 +27,11 @@ from ..magnet.flux import flux_at
 (
     T, G1, G2, BEND, TWIST, STRETCH, R1, R2, R3,
     P11, P22, P12, P13, P23, S1, S2, FACE1, FACE2, BEND2, A1, A2, B1, B2, M1, M2,
-) = range(13, 38)  # fmt: skip
+    D, P33,
+) = range(13, 40)  # fmt: skip
 """Compliances of stretch and shear; alpha of bending and torsion; `NU`; r_i^2; P; S;
-where along d1 and d2 the four Gauss points of the end face are; beta; A; B; M."""
+where along d1 and d2 the four Gauss points of the end face are; beta; A; B; M; D."""
 SOLID_WIDTH = 40
-"""Two are unused: a whole number of vectors."""
 _C1, _WX = 1, 10
 """Where a row's three compliances and its weight begin, as in `march`."""
 
@@ -50,16 +51,16 @@ def strains(p, y, v, H):  # type: ignore[no-untyped-def]
     g = p[S1] * b0 + p[S2] * b1
     f0 = p[P11] * b0 + p[P12] * b1 + p[P13] * b2 + p[S1] * g * g
     f1 = p[P12] * b0 + p[P22] * b1 + p[P23] * b2 + p[S2] * g * g
-    f2 = p[P13] * b0 + p[P23] * b1
+    f2 = p[P13] * b0 + p[P23] * b1 + p[P33] * b2
     U, V = p[A1] * b0 + p[A2] * b1, p[B1] * b0 + p[B2] * b1
     bend = 1.0 + p[BEND] * e + p[BEND2] * e * e
     f0 = bend + (f0 + 0.5 * e * (p[A1] * V + p[B1] * U)) / p[R1]
     f1 = bend + (f1 + 0.5 * e * (p[A2] * V + p[B2] * U)) / p[R2]
     f2 = 1.0 + p[TWIST] * e + f2 / p[R3]
     q0, q1 = p[M1] * H[6, 0], p[M2] * H[6, 1]
-    v[0] = k0 * f0 + p[_C1] * q0 * k2
-    v[1] = k1 * f1 + p[_C1 + 1] * q1 * k2
-    v[2] = k2 * f2 + p[_C1 + 2] * (q0 * k0 + q1 * k1)
+    v[0] = k0 * f0 + p[_C1] * (q0 + p[D] * k1) * k2
+    v[1] = k1 * f1 + p[_C1 + 1] * (q1 + p[D] * k0) * k2
+    v[2] = k2 * f2 + p[_C1 + 2] * (q0 * k0 + q1 * k1 + p[D] * k0 * k1)
     v[3] = p[G1] * H[6, 0] + p[M1] * k0 * k2
     v[4] = p[G2] * H[6, 1] + p[M2] * k1 * k2
     bent = p[R1] * b0 + p[R2] * b1
@@ -71,14 +72,15 @@ def strains(p, y, v, H):  # type: ignore[no-untyped-def]
     g1 = p[P22] + s * p[S2] ** 2 + e * p[A2] * p[B2]
     H[0, 0] = p[_C1] * (f0 + 2.0 * b0 * g0 / p[R1])
     H[1, 1] = p[_C1 + 1] * (f1 + 2.0 * b1 * g1 / p[R2])
-    H[2, 2] = p[_C1 + 2] * f2
+    H[2, 2] = p[_C1 + 2] * (f2 + 2.0 * b2 * p[P33] / p[R3])
     # C_i r_i^2 = T makes the rest symmetric.
     per = 2.0 * p[T] / (p[R1] * p[R2] * p[R3])
     g2 = p[P12] + s * p[S1] * p[S2] + 0.5 * e * (p[A1] * p[B2] + p[A2] * p[B1])
-    H[0, 1] = H[1, 0] = per * p[R3] * k0 * k1 * g2
-    H[0, 2] = per * p[R2] * k0 * k2 * p[P13] + p[_C1] * p[_C1 + 2] * q0
-    H[1, 2] = per * p[R1] * k1 * k2 * p[P23] + p[_C1 + 1] * p[_C1 + 2] * q1
-    H[2, 0], H[2, 1] = H[0, 2], H[1, 2]
+    H[0, 1] = per * p[R3] * k0 * k1 * g2 + p[_C1] * p[_C1 + 1] * p[D] * k2
+    q0, q1 = p[_C1] * (q0 + p[D] * k1), p[_C1 + 1] * (q1 + p[D] * k0)
+    H[0, 2] = per * p[R2] * k0 * k2 * p[P13] + q0 * p[_C1 + 2]
+    H[1, 2] = per * p[R1] * k1 * k2 * p[P23] + q1 * p[_C1 + 2]
+    H[1, 0], H[2, 0], H[2, 1] = H[0, 1], H[0, 2], H[1, 2]
     H[0, 3] = H[3, 0] = p[_C1] * p[M1] * k2
     H[1, 4] = H[4, 1] = p[_C1 + 1] * p[M2] * k2
     H[2, 3] = H[3, 2] = p[_C1 + 2] * p[M1] * k0

@@ -37,6 +37,7 @@ def table(*, strength: float = 1.0) -> np.ndarray:
         row[law.P11 : law.S2 + 1] = shape * row[law.R1]
         row[law.BEND2] = 4.0 * strength
         row[[law.M1, law.M2]] = np.array([-2e-4, 3e-4]) * strength
+        row[law.D], row[law.P33] = 0.1 * strength, -0.04 * strength * row[law.R3]
         row[law.A1 : law.B2 + 1] = (
             np.array([0.2, 0.1, 0.3, 0.4]) * strength * row[law.R1]
         )
