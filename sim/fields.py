@@ -296,7 +296,7 @@ def refuse_outside(
     InputError
         If one of its points, in units of `unit_mm`, does.
     """
-    maps = _maps(field)
+    maps = maps_of(field)
     if not maps:
         return
     points_mm = np.column_stack([x, y, 0.0 * x if z is None else z]) * unit_mm
@@ -323,7 +323,7 @@ def outside(
         These units.
     """
     left = np.zeros(len(curves), dtype=np.bool_)
-    maps = _maps(field)
+    maps = maps_of(field)
     if maps:
         points_mm = np.zeros((len(curves), curves.shape[2], 3))
         points_mm[..., :2] = curves.transpose(0, 2, 1) * unit_mm[:, None, None]
@@ -332,7 +332,8 @@ def outside(
     return left
 
 
-def _maps(field: Field) -> list[Any]:
+def maps_of(field: Field) -> list[Any]:
+    """Return the maps among the sources of a field."""
     if type(field) is not Field:
         return []
     return [source for source in field.sources if source.kind == "map"]

@@ -1,15 +1,16 @@
 """Many planar rods side by side: Newton on vectors of rods.
 
-Dimensionless as `planar.march`, for rods of one sign of magnetisation (before a magnet:
+Dimensionless as `planar.march`, for rods of one sign of magnetisation (before sources:
 of one load per tesla) and no weight, by Taylor steps of order 8. The unknowns are the
 angle gamma of the tip from its load, as sine and cosine, and the tip's position. A last
 march with steps half as long corrects the result, with the Newton matrix of the march
 before. Its own error is 2^-8 of what it changes (up to 2^-6 where the leading term
 passes through zero), and what it leaves is that change times the one before; the bound
-given takes 2^-5 and sixteen times the product.
+given takes 2^-5 and sixteen times the product. What the patches of a field
+(`batch.patches`) may be off counts by the inverse of the Newton matrix.
 
 A rod leaves this fast lane (its outcome is `HARD`) when it is long in units of its
-boundary layer, near antiparallel to the field, near the magnet, when Newton's
+boundary layer, near antiparallel to the field, near a source, when Newton's
 corrections do not shrink as they should, or when the Jacobi determinant is not clearly
 positive: `planar.solve_planar_rows` decides those.
 """
@@ -21,14 +22,15 @@ import math
 import numpy as np
 
 from ...core.jit import njit
+from ..magnet.flux import INLINE, PART
 from ..planar.march import E, H, M
-from .survey import OPTIONS, near, sorted_rows, survey, tip_load
+from .survey import NO_FLUX, PLAIN, near, sorted_rows, survey, tip_flux
 from .taylor8 import COLUMN, LANES, SERIES, STATE, column_step, state_step
 
 HARD = 9
 """Outcome of a rod that the lanes leave to the scalar solver."""
-CLOSE = 2e-4
-"""Correction after which the last march leaves about 1e-9."""
+CLOSE = 1e-3
+"""Correction after which the next is about 1e-7, and the last march leaves its 1e-9."""
 ROUNDING = 1e-12
 
 # Offsets, in one array of work space, of what the lanes hold. With constant distances
@@ -42,7 +44,10 @@ _H, _E, _P, _M = (LANES * k for k in range(11, 15))
 _TURN, _MOVE, _SWING, _BEFORE, _LOW = (LANES * k for k in range(15, 20))
 """Newton's corrections of gamma, position and direction, what they must not exceed, and
 the least d(gamma)/d(gamma_L) met in a march."""
-_Z = LANES * 20
+_OFF, _GAIN, _LENGTH, _SIGN = (LANES * k for k in range(20, 24))
+"""How much the load may be off, and how far it then moves the tip; length in mm, and
+sign of the magnetisation."""
+_Z = LANES * 24
 _C1 = _Z + LANES * STATE
 _C2 = _C1 + LANES * COLUMN
 _T = _C2 + LANES * COLUMN
@@ -50,29 +55,55 @@ _PACK = _T + LANES * SERIES
 """State, columns by tip angle and by load, series; then h, e, m of every section."""
 
 
-@njit(**OPTIONS)
-def _begin(rows, rods, start, w, outcome):  # type: ignore[no-untyped-def]
-    """Guess the tips from compliances to the load and its directions at first.
+@njit(**INLINE)
+def _guess(soft, c, s):  # type: ignore[no-untyped-def]
+    """Guess sine and cosine of gamma and the tip from compliance and load direction.
 
     With T = -phi at the clamp, gamma = T - atan2(soft sin T, 1 + 0.81 soft cos T) is
     right for soft rods and at the Euler load, and within a few hundredths between.
     """
+    a = 1.0 + 0.81 * soft * c
+    b = -soft * s
+    f = 1.0 / math.sqrt(a * a + b * b)
+    theta = math.atan2(b, a)
+    return (
+        -(s * a + c * b) * f,
+        (c * a - s * b) * f,
+        1.0 - 0.25 * theta * theta,
+        -0.65 * theta,
+    )
+
+
+@njit(**PART)
+def _begin(rows, rods, length, start, w, outcome):  # type: ignore[no-untyped-def]
+    """Guess the tips from the load on the straight rods and its gradient there."""
     for i in range(rows.shape[0]):
         row = rows[i]
         outcome[row] = 0
-        soft, c, s = start[row, 0], start[row, 2], -start[row, 3]
-        a = 1.0 + 0.81 * soft * c
-        b = soft * s
-        f = 1.0 / math.sqrt(a * a + b * b)
-        theta = math.atan2(b, a)
-        w[_SIN + i] = (s * a - c * b) * f
-        w[_COS + i] = (c * a + s * b) * f
-        w[_X + i] = 1.0 - 0.25 * theta * theta
-        w[_Y + i] = -0.65 * theta
+        soft, c, s = start[row, 0], start[row, 2], start[row, 3]
+        sine, cosine, x, y = _guess(soft, c, s)
+        if start.shape[1] > PLAIN:
+            # Before sources: the load at the tip so guessed. Fluxes fall as
+            # 1 / (1 + change), and do not turn round.
+            gxy = start[row, PLAIN + 1]
+            bx = start[row, PLAIN] * (x - 1.0) + gxy * y
+            by = gxy * (x - 1.0) + start[row, PLAIN + 2] * y
+            f = 1.0 / (1.0 + math.sqrt(bx * bx + by * by))
+            bx = c + f * bx
+            by = s + f * by
+            size = math.sqrt(bx * bx + by * by)
+            sine, cosine, x, y = _guess(soft * size, bx / size, by / size)
+        w[_SIN + i] = sine
+        w[_COS + i] = cosine
+        w[_X + i] = x
+        w[_Y + i] = y
         w[_FLUX + i] = start[row, 1]
         w[_CF + i] = c
-        w[_SF + i] = -s
+        w[_SF + i] = s
         w[_BX + i] = w[_BY + i] = w[_TX + i] = w[_TY + i] = 0.0
+        w[_OFF + i] = 0.0
+        w[_LENGTH + i] = length[row]
+        w[_SIGN + i] = -1.0 if rods[row, 0, M] < 0.0 else 1.0
         w[_M + i] = abs(rods[row, 0, M])
         w[_BEFORE + i] = 0.6
         for k in range(rods.shape[1]):
@@ -82,12 +113,12 @@ def _begin(rows, rods, start, w, outcome):  # type: ignore[no-untyped-def]
             w[at + 2 * LANES] = abs(rods[row, k, M])
 
 
-@njit(**OPTIONS)
+@njit(**PART)
 def _part(w, first, rows):  # type: ignore[no-untyped-def]
     return w[first : first + rows * LANES]
 
 
-@njit(**OPTIONS)
+@njit(**PART)
 def _march(count, sections, steps, columns, w):  # type: ignore[no-untyped-def]
     """March all rods, with no column, the tip angle's or also the load's."""
     z = _part(w, _Z, STATE)
@@ -123,12 +154,13 @@ def _march(count, sections, steps, columns, w):  # type: ignore[no-untyped-def]
                 column_step(count, h, e, p, t, 1.0, c2)
 
 
-@njit(**OPTIONS)
+@njit(**PART)
 def _correct(count, w):  # type: ignore[no-untyped-def]
     """Make one Newton step on (gamma, x_L, y_L) of all rods.
 
     Sets the sizes of the corrections of angle and position, NaN or infinite where a rod
-    is not stable, and how far the tip swings.
+    is not stable, how far the tip swings, and how far a load that is off by one, in
+    size and direction, would move it.
     """
     for i in range(count):
         cf = w[_CF + i]
@@ -158,9 +190,17 @@ def _correct(count, w):  # type: ignore[no-untyped-def]
         c = xt * yx - xx * yt
         det = tt * a + tx * b + ty * c
         g = -1.0 / det if det > 1e-3 else math.inf
+        b1 = tt * yy - ty * yt
+        b2 = ty * xt - tt * xy
+        c1 = tx * yt - tt * yx
+        c2 = tt * xx - tx * xt
         d0 = g * (a * rt + (ty * yx - tx * yy) * rx + (tx * xy - ty * xx) * ry)
-        d1 = g * (b * rt + (tt * yy - ty * yt) * rx + (ty * xt - tt * xy) * ry)
-        d2 = g * (c * rt + (tx * yt - tt * yx) * rx + (tt * xx - tx * xt) * ry)
+        d1 = g * (b * rt + b1 * rx + b2 * ry)
+        d2 = g * (c * rt + c1 * rx + c2 * ry)
+        push = abs(w[_C2 + i]) + abs(w[_C2 + 2 * LANES + i])
+        push = 1.0 + w[_M + i] * w[_FLUX + i] * (push + abs(w[_C2 + 3 * LANES + i]))
+        gain = abs(b) + abs(b1) + abs(b2) + abs(c) + abs(c1) + abs(c2)
+        w[_GAIN + i] = abs(g) * push * gain
         # The direction of the tip turns by d0, to second order.
         h = 0.5 * d0
         f = 1.0 / (1.0 + h * h)
@@ -173,30 +213,53 @@ def _correct(count, w):  # type: ignore[no-untyped-def]
         w[_SWING + i] = d0 + fx * d1 + fy * d2
 
 
-@njit(**OPTIONS)
-def _load_all(rows, rods, length, margin, magnet, gap, w, outcome):  # type: ignore[no-untyped-def]
+@njit(**PART)
+def _load_all(  # type: ignore[no-untyped-def]
+    rows, length, margin, gap, before, field, w, outcome
+):
     """Set the loads at all tips; where there is none, the rod is `HARD`."""
     for i in range(rows.shape[0]):
         row = rows[i]
-        sign = -1.0 if rods[row, 0, M] < 0.0 else 1.0
         if outcome[row] != 0:
             continue
-        size, cf, sf, bx, by, tx, ty = tip_load(
-            w[_X + i], w[_Y + i], length[row], gap[row], margin[row], sign, magnet
-        )
-        w[_FLUX + i] = size
-        if size == 0.0:
+        bx, by, gxx, gxy, gyy, off = tip_flux(
+            w[_X + i], w[_Y + i], length[row], gap[row], margin[row],
+            before, field,
+        )  # fmt: skip
+        w[_CF + i] = bx
+        w[_SF + i] = by
+        w[_BX + i] = gxx
+        w[_BY + i] = gxy
+        w[_TY + i] = gyy
+        w[_OFF + i] = off
+        if not bx * bx + by * by > NO_FLUX * NO_FLUX:
             outcome[row] = HARD
-            continue
-        w[_CF + i] = cf
-        w[_SF + i] = sf
-        w[_BX + i] = bx
-        w[_BY + i] = by
-        w[_TX + i] = tx
-        w[_TY + i] = ty
+    _turn_loads(rows.shape[0], w)
 
 
-@njit(**OPTIONS)
+@njit(**PART)
+def _turn_loads(count, w):  # type: ignore[no-untyped-def]
+    """Turn fluxes and gradients into flux and direction of the loads."""
+    for i in range(count):
+        bx, by = w[_CF + i], w[_SF + i]
+        gxx, gxy, gyy = w[_BX + i], w[_BY + i], w[_TY + i]
+        size = math.sqrt(bx * bx + by * by)
+        f = 1.0 / size
+        c = bx * f
+        s = by * f
+        length = w[_LENGTH + i]
+        g = length * f
+        w[_FLUX + i] = size
+        w[_CF + i] = w[_SIGN + i] * c
+        w[_SF + i] = w[_SIGN + i] * s
+        w[_BX + i] = length * (c * gxx + s * gxy)
+        w[_BY + i] = length * (c * gxy + s * gyy)
+        w[_TX + i] = g * (c * gxy - s * gxx)
+        w[_TY + i] = g * (c * gyy - s * gxy)
+        w[_OFF + i] *= f
+
+
+@njit(**PART)
 def _judge(rows, weight, w, outcome):  # type: ignore[no-untyped-def]
     """Return the largest correction; rods that do not converge well are `HARD`.
 
@@ -214,24 +277,29 @@ def _judge(rows, weight, w, outcome):  # type: ignore[no-untyped-def]
     return largest
 
 
-@njit(**OPTIONS)
+@njit(**PART)
 def _solve_block(  # type: ignore[no-untyped-def]
-    rows, rods, length, margin, magnet, gap, start, steps, w, out, outcome
-):
+    rows, rods, length, margin, gap, before, field,
+    start, steps, w, out, outcome,
+):  # fmt: skip
     """Solve up to LANES rods."""
-    uniform = magnet.shape[0] == 0
+    uniform = before.shape[0] == 0
     count = rows.shape[0]
     sections = rods.shape[1]
-    _begin(rows, rods, start, w, outcome)
+    _begin(rows, rods, length, start, w, outcome)
     for _ in range(8):
         if not uniform:
-            _load_all(rows, rods, length, margin, magnet, gap, w, outcome)
+            _load_all(
+                rows, length, margin, gap, before, field, w, outcome
+            )  # fmt: skip
         _march(count, sections, steps, 1 if uniform else 2, w)
         _correct(count, w)
         if _judge(rows, 0.0 if uniform else 1.0, w, outcome) < CLOSE:
             break
     if not uniform:
-        _load_all(rows, rods, length, margin, magnet, gap, w, outcome)
+        _load_all(
+            rows, length, margin, gap, before, field, w, outcome
+        )  # fmt: skip
     _march(count, sections, 2 * steps, 0, w)
     for i in range(count):
         cf, sf, s, c = w[_CF + i], w[_SF + i], w[_SIN + i], w[_COS + i]
@@ -241,54 +309,65 @@ def _solve_block(  # type: ignore[no-untyped-def]
         row = rows[i]
         cf, sf, x, y = w[_CF + i], w[_SF + i], w[_X + i], w[_Y + i]
         change = w[_TURN + i] + w[_MOVE + i]
-        before = 4.0 * w[_BEFORE + i]
+        last = 4.0 * w[_BEFORE + i]
         out[row, 0] = x
         out[row, 1] = y
         out[row, 2] += w[_SWING + i]
-        out[row, 3] = change / 32.0 + 16.0 * change * (change + before) + ROUNDING
+        out[row, 3] = change / 32.0 + 16.0 * change * (change + last) + ROUNDING
+        out[row, 3] += w[_GAIN + i] * w[_OFF + i]
         root = w[_Z + LANES + i] * cf - w[_Z + i] * sf
         # The solution that grows from zero load has gamma between 0 and T = -phi.
         good = root > 0.9 and w[_LOW + i] > 0.05 and w[_SIN + i] * sf < 1e-12
-        if not (good and change < 1e-3 and before <= CLOSE):
+        # It bends to the side to which the straight rod is pushed.
+        turned = start[row, 3] * y < -1e-9
+        if turned or not (good and change < 1e-3 and last <= CLOSE):
             outcome[row] = HARD
             continue
-        if not uniform and near(x, y, length[row], gap[row], margin[row], magnet):
+        if not uniform and near(
+            x, y, length[row], gap[row], margin[row], before, field
+        ):
             outcome[row] = HARD
 
 
-@njit(**OPTIONS)
+@njit(cache=True, nogil=True, error_model="numpy")
 def solve_lanes(  # type: ignore[no-untyped-def]
-    rods, length, margin, flux, cosine, sine, magnet, gap, out, outcome
-):
-    """Solve rods clamped along +x, in uniform fields or before a magnet.
+    rods, length, margin, flux, cosine, sine, gap, before, out,
+    outcome,
+):  # fmt: skip
+    """Solve rods clamped along +x, in uniform fields or before sources.
 
     Parameters
     ----------
     rods : ndarray, shape (n, sections, 5)
         Tip first (see `planar.march`).
     length, margin : ndarray, shape (n,)
-        Length in mm, and half the side over it: tips nearer to the magnet are `HARD`.
-    flux, cosine, sine : ndarray, shape (n,) or, before a magnet, (0,)
+        Length in mm, and half the side over it: tips nearer to a source are `HARD`.
+    flux, cosine, sine : ndarray, shape (n,) or, before sources, (0,)
         Of the uniform field, in T, and of its direction.
-    magnet : ndarray, shape (16,) or, in uniform fields, (0,)
-        `magnet_block` for no length and no gap, in mm.
     gap : ndarray, shape (n,) or, in uniform fields, (0,)
         In mm.
+    before : ndarray
+        What they stand before (`batch.patches.Before`); in uniform fields it is empty.
     out : ndarray, shape (n, 4)
         Receives x and y of the tip over L, its angle, and the error bound over L.
     outcome : ndarray, shape (n,)
         Receives 0 or `HARD`.
     """
     n, sections, _ = rods.shape
-    start = np.empty((n, 4))
+    start = np.empty((n, PLAIN if before.shape[0] == 0 else PLAIN + 3))
     steps = np.empty(n, dtype=np.int64)
     w = np.zeros(_PACK + 3 * sections * LANES)
-    survey(rods, length, margin, flux, cosine, sine, magnet, gap, start, steps)
+    field = np.empty(int(before[0]) if before.shape[0] > 0 else 0)
+    survey(
+        rods, length, margin, flux, cosine, sine, gap, before, field,
+        start, steps,
+    )  # fmt: skip
     outcome[:] = HARD
     order = sorted_rows(steps)
     for first in range(0, order.shape[0], LANES):
         rows = order[first : first + LANES]
         most = steps[rows[-1]]
         _solve_block(
-            rows, rods, length, margin, magnet, gap, start, most, w, out, outcome
-        )
+            rows, rods, length, margin, gap, before, field, start,
+            most, w, out, outcome,
+        )  # fmt: skip

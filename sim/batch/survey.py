@@ -11,8 +11,9 @@ import math
 import numpy as np
 
 from ...core.jit import njit
-from ..magnet.field import inside, plane_flux
+from ..magnet.flux import INLINE, PART, blocked, field_at
 from ..planar.march import E, H, M
+from .patches import ENOUGH, HEAD, on_patches
 
 STEP_UNIFORM = 0.6
 """What one step takes: errors stay below 1e-5 mm for rods of 30 mm."""
@@ -22,61 +23,67 @@ MOST_STEPS = 4
 """Most steps in a section."""
 LONGEST_ROD = 3.0
 """Largest sum of them: up to 3 pi / 2 there is one solution with gamma rising to T."""
+PLAIN = 4
+"""Numbers that a survey finds of a rod in a uniform field."""
+NO_FLUX = 1e-12
+"""Flux, in T, that is none."""
 ANTIPARALLEL = -0.996
 """Least cosine between the clamp's direction and the load's."""
-OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy"}
 
 
-@njit(**OPTIONS)
-def tip_load(x, y, length, gap, margin, sign, magnet):  # type: ignore[no-untyped-def]
-    """Return flux and direction of the load on a tip at (x, y), and their gradients.
+@njit(**INLINE)
+def place(before, length, gap, row):  # type: ignore[no-untyped-def]
+    """Write the field before a rod into `row` (`batch.patches.Before`)."""
+    width = row.shape[0]
+    for k in range(width):
+        at = HEAD + k
+        row[k] = before[at] + length * before[at + width] + gap * before[at + 2 * width]
 
-    By x and y: of the flux, then of the direction. No flux: there is no field, or the
-    magnet is in the way.
+
+@njit(**PART)
+def tip_flux(x, y, length, gap, margin, before, row):  # type: ignore[no-untyped-def]
+    """Return Bx, By, Gxx, Gxy, Gyy at a tip at (x, y), and how far B may be off.
+
+    In T and mm. No flux: there is none, or a source is in the way.
     """
-    px = length * (x - 1.0) + gap * magnet[12]
-    py = length * y + gap * magnet[13]
-    if inside(magnet, px, py, 0.0, length * margin):
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    b = plane_flux(magnet, px, py)
-    size = math.sqrt(b[0] * b[0] + b[1] * b[1])
-    if size < 1e-12:
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    c = b[0] / size
-    s = b[1] / size
-    g = length / size
-    return (
-        size,
-        sign * c,
-        sign * s,
-        length * (c * b[2] + s * b[3]),
-        length * (c * b[3] + s * b[4]),
-        g * (c * b[3] - s * b[2]),
-        g * (c * b[4] - s * b[3]),
-    )
+    px = length * x
+    py = length * y
+    off, bx, by, gxx, gxy, gyy = on_patches(before, px, py, length, gap)
+    if not off <= ENOUGH * math.sqrt(bx * bx + by * by):
+        off = 0.0
+        place(before, length, gap, row)
+        if blocked(row, px, py, 0.0, length * margin):
+            bx = by = gxx = gxy = gyy = 0.0
+        else:
+            bx, by, gxx, gxy, gyy = field_at(row, px, py)
+    return bx, by, gxx, gxy, gyy, off
 
 
-@njit(**OPTIONS)
-def near(x, y, length, gap, margin, magnet):  # type: ignore[no-untyped-def]
-    """Tell whether a rod with its tip at (x, y) might touch its magnet.
+@njit(**PART)
+def near(x, y, length, gap, margin, before, row):  # type: ignore[no-untyped-def]
+    """Tell whether a rod with its tip at (x, y) might touch a source.
 
     A curve of length 1 between two points at a distance d stays within
-    sqrt(1 - d^2) / 2 of the straight line between them (an ellipse); eight pieces of
-    that line are checked.
+    sqrt(1 - d^2) / 2 of the straight line between them (an ellipse). If what is so
+    near to the middle of that line or nearer is free, nothing is near; else nine places
+    on it are looked at.
     """
+    place(before, length, gap, row)
     d2 = x * x + y * y
-    far = 0.5 * math.sqrt(max(0.0, 1.0 - d2)) + math.sqrt(d2) / 16.0
-    far = length * (far + margin)
-    ox = gap * magnet[12] - length
-    oy = gap * magnet[13]
-    found = False
+    d = math.sqrt(d2)
+    wide = 0.5 * math.sqrt(max(0.0, 1.0 - d2)) + margin
+    px, py = length * x, length * y
+    if not blocked(row, 0.5 * px, 0.5 * py, 0.0, length * (wide + 0.5 * d)):
+        return False
+    far = length * (wide + d / 16.0)
     for k in range(9):
-        r = length * k / 8.0
-        found = found or inside(magnet, r * x + ox, r * y + oy, 0.0, far)
-    return found
+        r = k / 8.0
+        if blocked(row, r * px, r * py, 0.0, far):
+            return True
+    return False
 
 
-@njit(**OPTIONS)
+@njit(**PART)
 def _ready(rod, size, cosine, pull, step):  # type: ignore[no-untyped-def]
     """Return the rod's compliance to its load, and how many steps a section needs.
 
@@ -110,7 +117,7 @@ def _ready(rod, size, cosine, pull, step):  # type: ignore[no-untyped-def]
     return soft, max(1, math.ceil(longest))
 
 
-@njit(**OPTIONS)
+@njit(**PART)
 def _alike(rod, exactly):  # type: ignore[no-untyped-def]
     """Tell whether all sections are magnetised the same way, or exactly the same."""
     for k in range(1, rod.shape[0]):
@@ -119,13 +126,17 @@ def _alike(rod, exactly):  # type: ignore[no-untyped-def]
     return True
 
 
-@njit(**OPTIONS)
-def survey(rods, length, margin, flux, cosine, sine, magnet, gap, start, steps):  # type: ignore[no-untyped-def]
+@njit(**PART)
+def survey(  # type: ignore[no-untyped-def]
+    rods, length, margin, flux, cosine, sine,
+    gap, before, row, start, steps,
+):  # fmt: skip
     """Find the load on each straight rod, and how many steps it needs (0: hard).
 
-    `start` receives the compliance to the load, the flux and the load's direction.
+    `start` receives the compliance to the load, the flux and the load's direction; and
+    before sources the load's gradient (xx, xy, yy), over its size.
     """
-    uniform = magnet.shape[0] == 0
+    uniform = before.shape[0] == 0
     step = STEP_UNIFORM if uniform else STEP_MAGNET
     pull = 0.0
     for i in range(rods.shape[0]):
@@ -136,16 +147,21 @@ def survey(rods, length, margin, flux, cosine, sine, magnet, gap, start, steps):
             start[i, 1] = abs(flux[i])
             start[i, 2] = turn * cosine[i]
             start[i, 3] = turn * sine[i]
-        elif known and not near(1.0, 0.0, length[i], gap[i], margin[i], magnet):
-            size, cf, sf, _, by, _, ty = tip_load(
-                1.0, 0.0, length[i], gap[i], 0.0, sign, magnet
+        elif known and not near(1.0, 0.0, length[i], gap[i], margin[i], before, row):
+            bx, by, gxx, gxy, gyy, _ = tip_flux(
+                1.0, 0.0, length[i], gap[i], 0.0, before, row
             )
-            known = size > 0.0
+            size = math.sqrt(bx * bx + by * by)
+            known = size > NO_FLUX
             start[i, 1] = size
-            start[i, 2] = cf
-            start[i, 3] = sf
-            # d(m B sin phi) / dy
-            pull = (by * sf + size * cf * ty) * abs(rods[i, 0, M])
+            start[i, 2] = sign * bx / size
+            start[i, 3] = sign * by / size
+            # d(m By) / dy, in lengths of the rod
+            pull = length[i] * gyy * rods[i, 0, M]
+            g = sign * length[i] / size
+            start[i, PLAIN] = g * gxx
+            start[i, PLAIN + 1] = g * gxy
+            start[i, PLAIN + 2] = g * gyy
         else:
             known = False
         steps[i] = 0
@@ -155,7 +171,7 @@ def survey(rods, length, margin, flux, cosine, sine, magnet, gap, start, steps):
             )
 
 
-@njit(**OPTIONS)
+@njit(**PART)
 def sorted_rows(steps):  # type: ignore[no-untyped-def]
     """Return the rows that have steps, those with equally many side by side."""
     ends = np.zeros(MOST_STEPS + 1, dtype=np.int64)

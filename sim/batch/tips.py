@@ -16,13 +16,19 @@ from ...core.cross_section import ALL_SIZES
 from ...core.jit import plain_first
 from ...core.magnet import Magnet
 from ...core.progress import Progress, silent
-from ..fields import PULLED_IN, STABLE, UNSTABLE, Field, before, outside
-from ..magnet.field import magnet_block
+from ..fields import PULLED_IN, STABLE, UNSTABLE, Field, before, maps_of, outside
 from ..planar.outcomes import OK_UNSTABLE, TOUCHES
 from ..planar.solver import solve_planar_rows
-from ..scaling import direction, field_rows, many_rods, uniform_rows
+from ..scaling import (
+    direction,
+    field_rows,
+    many_rods,
+    refuse_overlap,
+    uniform_rows,
+)
 from .columns import at_most, check_magnet, columns_of
 from .lanes import HARD, solve_lanes
+from .patches import Before, before_rods
 from .threads import in_threads
 
 Array = NDArray[np.float64]
@@ -43,6 +49,7 @@ RESULT = np.dtype(
     ]
 )
 CHUNK = 4096
+_CORNERS = np.array([[-1.0, -1.0, 1.0, 1.0], [-1.0, 1.0, -1.0, 1.0]])
 _ORDER = 12
 _STEP = 0.4
 FEW = 1000
@@ -108,15 +115,30 @@ def solve_many(
         out[name] = np.nan if name not in ("outcome", "morse_index") else -1
     out["outcome"] = NOT_SOLVED
 
+    stood = _before(columns, magnet)
+
     def work(rows: slice) -> None:
-        _solve_chunk({k: v[rows] for k, v in columns.items()}, magnet, out[rows])
+        part = {k: v[rows] for k, v in columns.items()}
+        _solve_chunk(part, magnet, stood, out[rows])
 
     in_threads(work, n, CHUNK, threads=threads, progress=progress, stop=stop)
     return out
 
 
+def _before(columns: dict[str, Array], magnet: Magnet | Field | None) -> Before | None:
+    """Return what the rods stand before; None in uniform fields."""
+    if magnet is None:
+        return None
+    length_mm = columns["length_mm"].sum(axis=1)
+    gap_mm = columns.get("gap_mm", np.zeros(len(length_mm)))
+    return before_rods(before(magnet), length_mm, gap_mm)
+
+
 def _solve_chunk(
-    columns: dict[str, Array], magnet: Magnet | Field | None, out: NDArray[np.void]
+    columns: dict[str, Array],
+    magnet: Magnet | Field | None,
+    stood: Before | None,
+    out: NDArray[np.void],
 ) -> None:
     """Solve one chunk into `out`."""
     rods, total_mm, margins = many_rods(
@@ -125,27 +147,29 @@ def _solve_chunk(
         columns["remanence_mT"],
     )  # fmt: skip
     n = len(rods)
-    none = np.empty(0)
-    if magnet is None:
-        flux_T = columns["flux_mT"] * 1e-3
-        field = flux_T, *direction(columns["angle_deg"]), none, none
-    elif isinstance(magnet, Magnet):
-        block = magnet_block(magnet, length_mm=0.0, gap_mm=0.0)
-        field = none, none, none, block, columns["gap_mm"]
-    tips = np.empty((n, 4))
+    tips = np.zeros((n, 4))
     outcome = np.empty(n, dtype=np.int8)
     index = np.zeros(n, dtype=np.int8)
-    if isinstance(magnet, Field):
-        outcome[:] = HARD
+    none = np.empty(0)
+    if magnet is None or stood is None:
+        flux_T = columns["flux_mT"] * 1e-3
+        loads = flux_T, *direction(columns["angle_deg"]), none, none
     else:
-        solve_lanes(rods, total_mm, margins, *field, tips, outcome)
+        gap_mm = columns.get("gap_mm", np.zeros(n))
+        if stood.may_meet:
+            rows = stood.rows(total_mm, gap_mm)
+            refuse_overlap(before(magnet).sources, rows, np.ones(n))
+        loads = none, none, none, gap_mm, stood.numbers
+    solve_lanes(rods, total_mm, margins, *loads, tips, outcome)
+    if isinstance(magnet, Field) and maps_of(magnet):
+        outcome[_may_leave(magnet, tips, total_mm)] = HARD
     hard = np.flatnonzero(outcome == HARD)
     if len(hard):
         if magnet is None:
             fields = uniform_rows(flux_T[hard], columns["angle_deg"][hard])
         else:
-            gap_mm = columns["gap_mm"][hard] if "gap_mm" in columns else None
-            fields = field_rows(before(magnet), gap_mm, total_mm[hard])
+            gaps = columns["gap_mm"][hard] if "gap_mm" in columns else None
+            fields = field_rows(before(magnet), gaps, total_mm[hard])
         found = _solve_hard(rods[hard], fields, margins[hard], magnet, total_mm[hard])
         tips[hard], outcome[hard], index[hard] = found
     out["tip_x_mm"] = tips[:, 0] * total_mm
@@ -154,6 +178,19 @@ def _solve_chunk(
     out["error_mm"] = tips[:, 3] * total_mm
     out["outcome"] = outcome
     out["morse_index"] = index
+
+
+def _may_leave(field: Field, tips: Array, length_mm: Array) -> NDArray[np.bool_]:
+    """Tell of rods that run in lanes which might leave the box of a map.
+
+    A rod stays within its ellipse about the line from clamp to tip (`survey.near`), and
+    so between the squares of that size around both, if they are in the box.
+    """
+    wide = 0.5 * np.sqrt(np.maximum(0.0, 1.0 - tips[:, 0] ** 2 - tips[:, 1] ** 2))
+    corners = wide[:, None, None] * _CORNERS
+    at_clamp = np.broadcast_to(corners, (len(tips), 2, 4))
+    both = np.concatenate([at_clamp, tips[:, :2, None] + corners], axis=2)
+    return outside(field, both, length_mm)
 
 
 def _solve_hard(

@@ -196,7 +196,7 @@ def cuboid_flux(block, x, y, z, out):  # type: ignore[no-untyped-def]
             )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def plane_flux(block, x, y):  # type: ignore[no-untyped-def]
     """Return (Bx, By, dBx/dx, dBx/dy, dBy/dy) in the plane z = 0 of the specimen.
 
@@ -239,7 +239,7 @@ def plane_flux(block, x, y):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _near_plane(a, b, c, J, x, z):  # type: ignore[no-untyped-def]
     """Field and gradient in the magnet's own plane y = 0, for x, z >= 0.
 
@@ -265,11 +265,12 @@ def _near_plane(a, b, c, J, x, z):  # type: ignore[no-untyped-def]
             across = -s * u * b if w >= 0.0 else s * u * b
             along = abs(w) * r
             re, im = re * along - im * across, re * across + im * along
-            g = s * b / (r * d)
-            gxx -= u * g
-            gxz -= w * g
-            ru = r + u if u >= 0.0 else (b * b + w * w) / (r - u)
-            gyy += s * b / (r * ru)
+            # r + u is a quotient where it cancels; one division serves all.
+            over, under = (1.0, r + u) if u >= 0.0 else (r - u, b * b + w * w)
+            q = s * b / (r * d * under)
+            gxx -= u * q * under
+            gxz -= w * q * under
+            gyy += q * d * over
     f = J / (4.0 * math.pi)
     gxx *= 2.0
     gyy *= 2.0
@@ -282,7 +283,7 @@ def _near_plane(a, b, c, J, x, z):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def inside(block, x, y, z, margin):  # type: ignore[no-untyped-def]
     """Tell whether a point is within `margin` of the cuboid (or on it, or in it)."""
     dx = x - block[3]

@@ -37,6 +37,9 @@ PART = {
     "no_cfunc_wrapper": True,
 }
 """Options of a function that only kernels call."""
+INLINE = {**PART, "forceinline": True}
+"""The same for one that is little more than a choice: each array that a call hands on
+costs seven pushes."""
 UNIFORM, CUBOID, SUM, CYLINDER, DIPOLE, COIL, GRADIENT, CHARGES = (
     float(k) for k in range(8)
 )
@@ -223,7 +226,7 @@ def _plane_sum(field, x, y):  # type: ignore[no-untyped-def]
     return bx, by, gxx, gxy, gyy
 
 
-@njit(**PART)
+@njit(**INLINE)
 def field_at(field, x, y):  # type: ignore[no-untyped-def]
     """Return (Bx, By, Gxx, Gxy, Gyy) in the plane z = 0, for planar fields."""
     if field[0] == UNIFORM:
@@ -263,13 +266,31 @@ def distance(field, x, y, z):  # type: ignore[no-untyped-def]
     return nearest
 
 
+@njit(**PART)
+def clearance(field, x, y):  # type: ignore[no-untyped-def]
+    """Return how far from a point in the plane z = 0 the field is analytic, at least.
+
+    That is to the nearest body or charge.
+    """
+    nearest = distance(field, x, y, 0.0)
+    for i in range(sources_in(field)):
+        source = source_at(field, i)
+        if source[0] == CHARGES:
+            first = int(source[1])
+            for n in range(int(source[2])):
+                at = first + 4 * n
+                dx, dy, dz = x - field[at], y - field[at + 1], field[at + 2]
+                nearest = min(nearest, math.sqrt(dx * dx + dy * dy + dz * dz))
+    return nearest
+
+
 @njit(cache=True)
 def distance_at(field, x, y, z):  # type: ignore[no-untyped-def]
     """Return `distance`, for Python."""
     return distance(field, x, y, z)
 
 
-@njit(**PART)
+@njit(**INLINE)
 def blocked(field, x, y, z, margin):  # type: ignore[no-untyped-def]
     """Tell whether a point is within `margin` of a body, or in it."""
     if field[0] == UNIFORM:

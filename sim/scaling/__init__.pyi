@@ -8,7 +8,16 @@ from .fields import (
     field_rows as field_rows,
 )
 from .fields import (
+    template as template,
+)
+from .fields import (
     uniform_rows as uniform_rows,
+)
+from .overlap import (
+    may_meet as may_meet,
+)
+from .overlap import (
+    refuse_overlap as refuse_overlap,
 )
 from .rods import (
     MOST_POINTS as MOST_POINTS,

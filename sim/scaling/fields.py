@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Template:
+class Template:
     """The numbers of a field in mm and T, for an undeformed tip at the origin.
 
     `tip` and `gap` say how they change with the rod's length and with the gap of the
@@ -104,25 +104,26 @@ def field_rows(field: Field, gap_mm: Array | None, length_mm: Array) -> Array:
     InputError
         If a source waits for a gap and none is given, or two sources overlap.
     """
-    template = _template(field)
-    if template.waits and gap_mm is None:
+    of = template(field)
+    if of.waits and gap_mm is None:
         raise InputError(
             "gap_mm must be given in mm for sources that have neither centre_mm nor "
             "gap_mm; instead received none"
         )
     L = length_mm[:, None]
-    rows = template.numbers + L * template.tip
+    rows = of.numbers + L * of.tip
     if gap_mm is not None:
-        rows = rows + gap_mm[:, None] * template.gap
-    moved = template.power != 0.0
-    rows[:, moved] /= L ** template.power[moved]
+        rows = rows + gap_mm[:, None] * of.gap
+    moved = of.power != 0.0
+    rows[:, moved] /= L ** of.power[moved]
     rows = np.ascontiguousarray(rows)
     refuse_overlap(field.sources, rows, length_mm)
     return rows
 
 
 @lru_cache(maxsize=256)
-def _template(field: Field) -> _Template:
+def template(field: Field) -> Template:
+    """Return the numbers of a field, and how they change from rod to rod."""
     sources = field.sources
     records = [_record(source) for source in sources]
     kinds = [row[0] for row, *_ in records]
@@ -147,7 +148,7 @@ def _template(field: Field) -> _Template:
 
 def _joined(
     parts: list[tuple[Array, Array, Array, Array]], charges: list[Array], *, waits: bool
-) -> _Template:
+) -> Template:
     numbers, tip, gap, power = (np.concatenate(one) for one in zip(*parts, strict=True))
     if charges:
         tail = np.concatenate(charges)
@@ -156,7 +157,7 @@ def _joined(
         numbers = np.concatenate([numbers, tail])
         tip, gap = np.concatenate([tip, none]), np.concatenate([gap, none])
         power = np.concatenate([power, by])
-    return _Template(numbers=numbers, tip=tip, gap=gap, power=power, waits=waits)
+    return Template(numbers=numbers, tip=tip, gap=gap, power=power, waits=waits)
 
 
 def _record(source: Source) -> tuple[Array, Array, Array, Array]:
@@ -220,7 +221,7 @@ def _gradient(source: Gradient, row: Array, power: Array) -> None:
 
 
 def _map(source: FieldMap, row: Array, power: Array) -> None:
-    """Leave all to `_template`, which knows where the charges go."""
+    """Leave all to `template`, which knows where the charges go."""
 
 
 _KINDS: dict[type, tuple[float, Callable[[Any, Array, Array], None]]] = {
