@@ -34,11 +34,16 @@ SHORT, PASSING = 1e-5, 1e-6
 to where a direction becomes unstable rounding leaves more than `CONVERGED`."""
 SURE = 1e-6
 """Step of the load too short for a jump to another branch."""
-AGREED = 1e-3
-"""Difference of two loads at which a branch ends, by n and 2 n steps, that is none."""
+AGREED, ROUGH = 1e-3, 3e-5
+"""Difference of two loads at which a branch ends, by n and 2 n steps, that is none; the
+error of a shape from which on finer steps are to find the same index."""
+POLISH = 4
+"""Most marches by 2 n steps that correct a pose: one, unless the root moves far more
+than the tip."""
 MOST_STEPS = 3000.0
-MOST_LOADS = 4000
-"""Trials of a load on one way; a branch that asks for more is lost."""
+MOST_LOADS, PACE = 4000, 100
+"""Trials of a load on one way, and after how many is looked at the way made: a branch
+that asks for more at that pace is lost."""
 LOST, STEEP = -2, 1e6
 """Index where a branch is lost, fold or not: the root moves so many times as the tip,
 and what rounding leaves of the tip's pose no longer fixes the rest."""
@@ -167,6 +172,8 @@ def newton(rod, field, load, n, Rc, R, r, first, goal, J, held):  # type: ignore
     """Iterate the tip's pose (R, r) until the corrections are below `goal`.
 
     Coarse steps bring it near and give the matrix, which stays in `J`; then n steps.
+    Where the root moves far more than the tip, the coarse matrix is too rough for them,
+    and each gets its own.
 
     Returns
     -------
@@ -178,12 +185,13 @@ def newton(rod, field, load, n, Rc, R, r, first, goal, J, held):  # type: ignore
     w = held[0][0]
     before = size = math.inf
     fine = all_pairs(rod, COARSE * n) == all_pairs(rod, n)
-    start = end = False
+    start = end = own = False
     for k in range(24):
         if blocked(field, r[0], r[1], r[2], 0.0):
             return False, start, end
-        if before > CHORD:
-            end = run(rod, field, load, COARSE * n, R, r, True, size, held)
+        if own or before > CHORD:
+            steps = n if own else COARSE * n
+            end = run(rod, field, load, steps, R, r, True, size, held)
             start = end if k == 0 else start
             matrix(w, Z, J)
         else:
@@ -194,8 +202,12 @@ def newton(rod, field, load, n, Rc, R, r, first, goal, J, held):  # type: ignore
         if trace < 1.0 or not solve6(A, x):
             return False, start, end
         size = _move(R, r, x)
-        if not size < first or (k > 0 and size > max(0.25 * before, goal)):
+        if not size < first:
             return False, start, end
+        if k > 0 and size > max(0.25 * before, goal):
+            if own or before > CHORD:
+                return False, start, end
+            own = fine = True
         if fine and size < goal:
             return True, start, end
         before = size
@@ -211,22 +223,27 @@ def follow(rod, field, n, Rc, R, r, goal, J, held):  # type: ignore[no-untyped-d
 
     Returns the Morse index and the load reached.
 
-    Predictions go along the secant: a tangent would leave the plane where a planar
-    rod begins to swing, and Newton's matrix is singular.
+    Predictions go along the parabola through the last three poses: a tangent would
+    leave the plane where a planar rod begins to swing, and Newton's matrix is singular.
+    Where the root moves a million times as far as the tip, they must be that close.
 
     A branch changes its index at single loads only: a step over which it changes is
     taken again in halves, until it is too short to have jumped to another branch.
     """
     Rb, rb = R.copy(), r.copy()
-    secant, x = np.zeros((6, 1)), np.zeros((6, 1))
-    load, jump, index = 0.0, 0.125, 0
-    for _ in range(MOST_LOADS):
+    secant, bend, x = np.zeros((6, 1)), np.zeros((6, 1)), np.zeros((6, 1))
+    load, last, jump, index, then, eager = 0.0, 0.0, 0.125, 0, 0.0, True
+    for k in range(MOST_LOADS):
         if load == 1.0:
             return index, 1.0
+        if k % PACE == PACE - 1:
+            if (load - then) * (MOST_LOADS / PACE) < 1.0 - load:
+                break
+            then = load
         jump = min(jump, 1.0 - load)
         ahead = 1.0 if jump == 1.0 - load else load + jump
         Rb[:], rb[:] = R, r
-        x[:] = jump * secant
+        x[:] = jump * secant + jump * (jump + last) * bend
         there = -1
         if _move(R, r, x) < LONGEST:
             held[3][0] = 0.0
@@ -237,14 +254,18 @@ def follow(rod, field, n, Rc, R, r, goal, J, held):  # type: ignore[no-untyped-d
             elif found:
                 there = morse_index(rod, field, ahead, COARSE * n, R, r)
         if there == index or (there >= 0 and jump < SURE):
+            bend[:] = secant
             _turn(Rb, R, secant)
             secant[3:, 0] = r - rb
             secant /= jump
-            index, load = there, ahead
-            jump *= 2.0
+            bend[:] = (secant - bend) * (1.0 / (jump + last) if last > 0.0 else 0.0)
+            index, load, last = there, ahead, jump
+            jump *= 2.0 if eager else 1.0
+            eager = True
         else:
             R[:], r[:] = Rb, rb
             jump *= 0.5
+            eager = False
             if jump < MIN_LOAD_STEP:
                 return index, load
     return index if load == 1.0 else LOST, load
@@ -283,31 +304,40 @@ def solve_pose(rod, field, n, Rc, R, r, goal, held):  # type: ignore[no-untyped-
         if load < 1.0:
             lost = index == LOST or np.max(np.abs(J)) > STEEP
             return LOST if lost else -1, load, 0.0
-    run(rod, field, 1.0, 2.0 * n, R, r, False, 0.0, held)
-    _miss(held[0][0], Rc, x)
-    error = np.sum(np.abs(x))
-    solve6(J, x)
-    return index, 1.0, error + _move(R, r, x) + 1e-15 * n
+    for k in range(POLISH):
+        moved = math.inf if k > 0 else 0.0
+        run(rod, field, 1.0, 2.0 * n, R, r, False, moved, held)
+        _miss(held[0][0], Rc, x)
+        error = np.sum(np.abs(x))
+        solve6(J.copy(), x)
+        error += _move(R, r, x)
+        if error < ROUGH:
+            break
+    if k > 0:
+        index = morse_index(rod, field, 1.0, n, R, r)
+    return index, 1.0, error + 1e-15 * n
 
 
 @njit(cache=True)
 def solve_sure(rod, field, n, Rc, R, r, goal):  # type: ignore[no-untyped-def]
-    """Find the pose as `solve_pose`; believe that there is none when finer steps agree.
+    """Find the pose as `solve_pose`; believe what finer steps agree on.
 
-    A rod that is drawn to a magnet feels far more there than what its steps are for.
+    A rod that is drawn to a magnet feels far more there than what its steps are for: so
+    if there is none, or if it is a rough one.
 
     Returns
     -------
     tuple
         Index, load and error, the steps n that found them, and their `room`.
     """
-    before = -1.0
+    seen, before = -1, -1.0
     while True:
         held = room(rod, field, 2.0 * n)
         index, load, error = solve_pose(rod, field, n, Rc, R, r, goal, held)
-        if index >= 0 or abs(load - before) < AGREED or n > MOST_STEPS:
+        sure = error < ROUGH if index >= 0 else abs(load - before) < AGREED
+        if sure or (index >= 0 and index == seen) or n > MOST_STEPS:
             return index, load, error, n, held
-        before = load
+        seen, before = index, load if index < 0 else -1.0
         n *= 2.0
 
 

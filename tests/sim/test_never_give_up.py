@@ -14,14 +14,17 @@ from magbend.sim import (
     MagnetField,
     Rod,
     Section,
+    Support,
     UniformField,
     sensitivities,
     solve,
     solve_many,
     solve_spatial,
+    solve_spatial_many,
     verify,
 )
 from magbend.sim.batch import OUTCOMES
+from magbend.sim.check.space import check_spatial
 
 
 def attracted(gap_mm: float) -> tuple[Rod, MagnetField]:
@@ -127,3 +130,58 @@ def test_a_rod_whose_tip_does_not_fix_its_root_is_solved_in_pieces(
     assert found.status == "stable"
     assert found.error_mm < 1e-6
     assert verify(rod, field, found, degree=40) < 1e-6
+
+
+DRAWN = {
+    "its root moves 1e8 times as far as its tip": {
+        "length_mm": [19.6568, 21.6154], "E_MPa": [7.9129, 11.1231],
+        "side_mm": 0.8021, "remanence_mT": [-375.9423, -199.6885],
+        "remanence_y_mT": [127.8791, 10.2841], "remanence_z_mT": [97.9562, -105.8727],
+        "natural_curvature_per_mm": 0.0193, "density_kg_m3": 2080.25, "gap_mm": 40.3859,
+    },
+    "its root moves 2e7 times as far": {
+        "length_mm": [21.8728, 20.6303], "E_MPa": [6.5479, 16.9262],
+        "side_mm": 1.1041, "remanence_mT": [-377.6723, -416.8757],
+        "natural_curvature_per_mm": 0.0161, "density_kg_m3": 1258.05, "gap_mm": 41.021,
+    },
+    "rough steps find another index": {
+        "length_mm": [19.9554, 14.6916], "E_MPa": [29.7489, 8.6788],
+        "side_mm": 1.231, "remanence_mT": [157.3408, -461.6304],
+        "natural_curvature_per_mm": 0.0145, "density_kg_m3": 2229.57, "gap_mm": 35.263,
+    },
+}  # fmt: skip
+OFF_ITS_PLANE = Magnet.cube(55.0, 1.305, elevation_deg=20.0, offset_mm=(5.0, 0.0, 8.0))
+HELD = Support(gravity_m_s2=(1.0, -2.0, -9.5), clamp_angle_deg=15.0)
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_a_rod_drawn_out_of_its_plane_is_followed_all_the_way(name: str) -> None:
+    one = DRAWN[name]
+    along_y, along_z = (one.get(f"remanence_{axis}_mT", [0.0, 0.0]) for axis in "yz")
+    rod = Rod(
+        name=name, side_mm=one["side_mm"], remanence_mT=0.0,
+        density_kg_m3=one["density_kg_m3"],
+        natural_curvature_per_mm=one["natural_curvature_per_mm"],
+        sections=tuple(
+            Section(
+                length_mm=mm, E_MPa=MPa, remanence_mT=mT, remanence_y_mT=y,
+                remanence_z_mT=z,
+            )
+            for mm, MPa, mT, y, z in zip(
+                one["length_mm"], one["E_MPa"], one["remanence_mT"], along_y, along_z,
+                strict=True,
+            )
+        ),
+    )  # fmt: skip
+    field = MagnetField(magnet=OFF_ITS_PLANE, gap_mm=one["gap_mm"])
+    check = check_spatial(rod, field, support=HELD)
+    assert (check.load, check.morse_index) == (1.0, 0)
+    found = solve_spatial(rod, field, support=HELD)
+    assert found.status == "stable"
+    assert np.abs(check.at(found.s_mm) - found.r_mm).max() < found.error_mm < 1e-3
+    (row,) = solve_spatial_many(
+        {key: [value] for key, value in one.items()}, magnet=OFF_ITS_PLANE, support=HELD
+    )
+    assert (row["outcome"], row["morse_index"]) == (0, 0)
+    tip = [row[f"tip_{axis}_mm"] for axis in "xyz"]
+    assert np.abs(np.subtract(tip, check.tip_mm)).max() < row["error_mm"] < 1e-2
