@@ -228,7 +228,7 @@ def _look(grey: Image, state: State, sign: float, turn: int, *, seeking: bool) -
     state.width = median(edges.width[good])
     blur = edges.blur
     state.blur = float(np.clip(blur, 0.3, 0.5 * state.width)) if blur > 0 else 1.0
-    if turn and not state.rough:
+    if (turn == 1 or state.blurs is not None) and not state.rough:
         local = np.clip(edges.blurs(_BLUR_PARTS), 0.3, 0.5 * state.width)
         state.blurs = local if np.ptp(local) > _UNEVEN * state.blur else None
     state.scatter = _scatter(edges, int(5.0 / step))
