@@ -89,6 +89,8 @@ def _levels(
         return None
     low, high = across[body[[0, -1]]]
     inside = (across > low + clear) & (across < high - clear)
+    if not inside.any() or np.ptp(profile[inside]) < _STEP * (paper - dark):
+        return None  # as nearly all rods are: at no cost
     step = _step(across[inside], profile[inside], paper, narrow, clear)
     if step is None:
         return None
