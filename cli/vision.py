@@ -139,7 +139,7 @@ def extract(
     rod = specimen_of(specimen, run)
     if rod is not None:
         setting = with_specimen(setting, rod)
-    _refuse_joints_beyond(setting, joints_mm)
+    _check_joints(setting, joints_mm)
     made_with = [path for path in (calibration, bare) if path is not None]
     kept = f"{folder} holds what was measured; --resume goes on from there"
     with owning_folder(folder, "extraction", "vision extract", ours=is_made_by_us):
@@ -227,13 +227,20 @@ def _numbers(text: str) -> tuple[float, ...]:
     return values
 
 
-def _refuse_joints_beyond(setting: Setting, given: str) -> None:
-    """Refuse joints that were given and lie beyond the rod, where its length is known.
+def _check_joints(setting: Setting, given: str) -> None:
+    """Refuse joints that were given and have no scale, or lie beyond a known length.
 
     A specimen's own joints lie within it.
     """
     length_mm, joints_mm = setting.length_mm, setting.joints_mm
-    if given and length_mm and joints_mm and joints_mm[-1] >= length_mm:
+    if not given or not joints_mm:
+        return
+    if setting.calibration is None and length_mm is None:
+        raise InputError(
+            f"--joints-mm {given} are in mm, and nothing says how many pixels that is: "
+            "give --calibration, or the rod's --length-mm"
+        )
+    if length_mm and joints_mm[-1] >= length_mm:
         raise InputError(
             f"--joints-mm must lie within the rod's {length_mm:g} mm; "
             f"instead received {joints_mm[-1]:g} mm"

@@ -182,6 +182,7 @@ def test_figure_and_edges_are_written(magbend, tmp_path, calibration):
         (["extract", BOARD, "--joints-mm", "1e9,10"], 1, "rising"),
         (["extract", BOARD, "--joints-mm", "9,9"], 1, "rising"),
         (["extract", BOARD, "--joints-mm", "9,40", "--length-mm", "30"], 1, "within"),
+        (["extract", BOARD, "--joints-mm", "9,20"], 1, "give --calibration"),
         (["extract", BOARD, "--rod-height-mm", "nan"], 1, "--rod-height-mm"),
         (["extract", BOARD, "--length-mm", "-3"], 1, "--length-mm must be above zero"),
         (["extract", BOARD, "--length-mm", "0"], 1, "--length-mm must be above zero"),

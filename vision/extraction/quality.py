@@ -18,6 +18,7 @@ from ..measurement import Measurement
 from ..picture.photo import Photo
 from .beyond_tip import goes_on_after_gap, tip_goes_on
 from .body_at_end import check_ends
+from .crossing import crossed_at
 from .deviations import scale_sd
 from .refine import Refined
 from .root import HIDDEN_MM, root_hidden
@@ -76,6 +77,13 @@ def refusal(photo: Photo, view: View, refined: Refined, candidate: Candidate) ->
             "the axis runs over bare paper for a while: two things may cross there",
         )
     check_ends(photo, view, refined)
+    at = None if refined.rough else crossed_at(view, refined)
+    if at is not None:
+        raise LostError(
+            "touches_object",
+            "something as dark as the rod crosses or touches it, at "
+            f"{100.0 * at / length:.0f} % of its length: take it away",
+        )
     if length < 5.0 * width:
         raise LostError("no_rod", "what looks like a rod is shorter than five widths")
 
