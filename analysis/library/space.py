@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -276,7 +276,7 @@ class Space(FileModel):
 
     def _sobol_rows(self, start: int, stop: int) -> Designs:
         k = len(self.section)
-        u = sobol_points(2 * k + 4, start, stop, self.seed)
+        u = points_of_blocks(2 * k + 4, start, stop, self.seed)
         lengths = _sobol_lengths(self, u[:, :k])
         moduli = _sobol_moduli(self, u[:, k : 2 * k])
         axes = (self.side_mm, self.remanence_mT, self.angle_deg, self.load_axis)
@@ -331,6 +331,10 @@ def read_space(path: Path) -> Space:
     return space.model_copy(update={"source": sim.tables_of(field)})
 
 
+BLOCK = 1 << 14
+"""Points of a Sobol sequence that are drawn at once (`points_of_blocks`)."""
+
+
 def sobol_points(dimension: int, start: int, stop: int, seed: int) -> Array:
     """Return points `start` to `stop` - 1 of a scrambled Sobol sequence."""
     from scipy.stats import qmc
@@ -342,6 +346,26 @@ def sobol_points(dimension: int, start: int, stop: int, seed: int) -> Array:
     else:  # a first draw of a power of two keeps the sequence balanced (and silent)
         points = sequence.random(1 << (stop - 1).bit_length())
     return np.asarray(points[: stop - start], dtype=np.float64)
+
+
+def points_of_blocks(dimension: int, start: int, stop: int, seed: int) -> Array:
+    """Return what `sobol_points` does, for callers that go on from piece to piece.
+
+    To begin a sequence takes as long as to draw thousands of points of it.
+    """
+    blocks = range(start // BLOCK, (stop - 1) // BLOCK + 1)
+    return np.concatenate(
+        [
+            _block(dimension, block, seed)[max(0, start - at) : stop - at]
+            for block in blocks
+            for at in (block * BLOCK,)
+        ]
+    )
+
+
+@lru_cache(maxsize=16)
+def _block(dimension: int, block: int, seed: int) -> Array:
+    return sobol_points(dimension, block * BLOCK, (block + 1) * BLOCK, seed)
 
 
 def _product(axes: list[Axis], what: str) -> Array:

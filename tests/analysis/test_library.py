@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from magbend.analysis.compare.metrics import circularity, fit_circle, quadratic_fit
+from magbend.analysis.library import space as space_module
 from magbend.analysis.library.build import (
     MANIFEST,
     build,
@@ -517,3 +518,20 @@ def test_without_pyarrow_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
     with pytest.raises(MissingExtraError, match=r"\.\[library\]"):
         build(space, tmp_path / "out")
+
+
+def test_a_sobol_sequence_begins_once_for_a_block_of_its_points(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    kept, begun = space_module.sobol_points, []
+
+    def counted(*asked: int) -> np.ndarray:
+        begun.append(asked)
+        return kept(*asked)
+
+    monkeypatch.setattr(space_module, "sobol_points", counted)
+    end = space_module.BLOCK
+    for start in range(end - 2000, end + 2000, 500):
+        points = space_module.points_of_blocks(5, start, start + 600, 987)
+        assert np.array_equal(points, kept(5, start, start + 600, 987))
+    assert len(begun) == 2
