@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -105,6 +106,24 @@ def _tell_clamps(frames: Sequence[FrameRow]) -> None:
         )
 
 
+def _tell_doubts(frames: Sequence[FrameRow]) -> None:
+    """Say what is doubted, once for photographs in a row (of a film, hundreds)."""
+    for words, row in groupby(frames, key=_doubts):
+        if not words:
+            continue
+        names = [frame.image for frame in row]
+        if len(names) > 2:
+            names = [f"{names[0]} to {names[-1]} ({len(names)})"]
+        for name in names:
+            say(f"{name}: {words}", err=True)
+
+
+def _doubts(frame: FrameRow) -> str:
+    if not frame.ok:
+        return f"failed: {frame.reason}"
+    return ", ".join(flag for flag in frame.flags if flag not in _TOLD_ONCE)
+
+
 def tell_frames(result: BatchResult, *, json_output: bool) -> None:
     """Print what came of the photographs: their doubts, and how many were measured."""
     if json_output:
@@ -135,11 +154,7 @@ def tell_frames(result: BatchResult, *, json_output: bool) -> None:
             }
         )
         return
-    for frame in result.frames:
-        if not frame.ok:
-            say(f"{frame.image}: failed: {frame.reason}", err=True)
-        elif doubts := [f for f in frame.flags if f not in _TOLD_ONCE]:
-            say(f"{frame.image}: {', '.join(doubts)}", err=True)
+    _tell_doubts(result.frames)
     _tell_clamps(result.frames)
     for flag, words in _EXPLAINED.items():
         count = sum(flag in frame.flags for frame in result.frames)

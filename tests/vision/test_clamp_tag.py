@@ -114,6 +114,30 @@ def test_a_tag_is_found_in_perspective_blur_and_noise(options, light):
     assert seen.angle_sd_deg < 0.06
 
 
+def test_a_tag_is_found_alike_near_where_it_should_be_and_anywhere(camera):
+    grey = as_photo(taken(camera, 30.0)).grey
+    anywhere = find_tag(grey, camera, LABEL.tag)
+    middle = np.array([[anywhere.pose.x_mm, anywhere.pose.y_mm]])
+    (near,) = camera.to_px(middle, height_mm=LABEL.tag.height_mm)
+    for off_px in ((0.0, 0.0), (15.0, -20.0), (400.0, -300.0), (-1e4, 0.0)):
+        seen = find_tag(grey, camera, LABEL.tag, near + off_px)
+        assert seen.pose.x_mm == pytest.approx(anywhere.pose.x_mm, abs=1e-3)
+        assert seen.pose.y_mm == pytest.approx(anywhere.pose.y_mm, abs=1e-3)
+        assert seen.pose.angle_deg == pytest.approx(anywhere.pose.angle_deg, abs=0.01)
+
+
+def test_another_print_of_the_tag_is_not_taken_for_that_on_the_clamp(tagged):
+    picture = taken(tagged, 30.0)
+    alone = extract(as_photo(picture), tagged, rod_height_mm=HEIGHT)
+    clamp = POSE.to_board(np.array([[LABEL.x_mm, LABEL.y_mm]]))
+    x, y = np.rint(tagged.to_px(clamp, height_mm=LABEL.tag.height_mm)[0]).astype(int)
+    picture[20:150, -170:-40] = picture[y - 65 : y + 65, x - 65 : x + 65]
+    found = extract(as_photo(picture), tagged, rod_height_mm=HEIGHT)
+    assert "tag_not_seen" not in found.flags
+    assert found.clamp_angle_sd_deg == pytest.approx(alone.clamp_angle_sd_deg, rel=0.1)
+    assert found.pose.angle_deg == pytest.approx(alone.pose.angle_deg, abs=0.01)
+
+
 def test_where_the_root_is_from_the_tag_is_learnt_from_photographs(tagged):
     tag = tagged.clamp_tag
     frame = Pose(x_mm=LABEL.x_mm, y_mm=LABEL.y_mm, angle_deg=LABEL.angle_deg)

@@ -24,6 +24,9 @@ Image = NDArray[np.float32]
 
 SEEN_PX = 40.0
 """Side of a marker, on the smaller picture on which it is sought."""
+AROUND = 1.5
+"""Half side of the window in which it is sought first, where the rod tells where it is,
+in sides of the marker: it fits turned by any angle, with its margin."""
 STATIONS, CORNERS = 40, 0.12
 """Stations along an edge, and the share of it near each corner that is left out."""
 STEP_PX, REACH_PX = 0.25, 6.0
@@ -59,7 +62,9 @@ class SeenTag:
     side_sd_mm: float
 
 
-def find_tag(grey: Image, camera: Calibration, tag: ClampTag) -> SeenTag | None:
+def find_tag(
+    grey: Image, camera: Calibration, tag: ClampTag, near_px: Array | None = None
+) -> SeenTag | None:
     """Find the tag on the clamp; None where it is not seen.
 
     Parameters
@@ -70,8 +75,12 @@ def find_tag(grey: Image, camera: Calibration, tag: ClampTag) -> SeenTag | None:
         Of the camera that took the photograph.
     tag : ClampTag
         Which marker, its side and height.
+    near_px : ndarray, shape (2,), optional
+        Where its middle should be: it is sought there first, which is faster.
     """
-    corners = _corners(grey, camera, tag)
+    corners = None if near_px is None else _corners_near(grey, camera, tag, near_px)
+    if corners is None:
+        corners = _corners(grey, tag, _side_px(grey, camera, tag))
     if corners is None:
         return None
     for _ in range(2):
@@ -104,11 +113,33 @@ def find_tag(grey: Image, camera: Calibration, tag: ClampTag) -> SeenTag | None:
     )  # fmt: skip
 
 
-def _corners(grey: Image, camera: Calibration, tag: ClampTag) -> Array | None:
+def _side_px(grey: Image, camera: Calibration, tag: ClampTag) -> float:
+    """Return how large the marker is in the middle of the picture."""
+    height, width = grey.shape
+    middle = (0.5 * width, 0.5 * height)
+    return tag.side_mm / camera.mm_per_px(middle, height_mm=tag.height_mm)
+
+
+def _corners_near(
+    grey: Image, camera: Calibration, tag: ClampTag, near_px: Array
+) -> Array | None:
+    """Return the marker's corners as `_corners` does, from a window of the picture."""
+    side = _side_px(grey, camera, tag)
+    reach = AROUND * side
+    low = np.maximum(np.floor(near_px - reach), 0.0)
+    high = np.ceil(near_px + reach)
+    if not np.all(np.isfinite(high - low)) or np.any(high - low < side):
+        return None
+    (x0, y0), (x1, y1) = low.astype(int), high.astype(int)
+    window = grey[y0:y1, x0:x1]
+    corners = _corners(window, tag, side) if min(window.shape) > side else None
+    return None if corners is None else corners + low
+
+
+def _corners(grey: Image, tag: ClampTag, side_px: float) -> Array | None:
     """Return the marker's corners to a pixel or so, from the printed left top on."""
     height, width = grey.shape
-    scale = camera.mm_per_px((0.5 * width, 0.5 * height), height_mm=tag.height_mm)
-    factor = max(1.0, tag.side_mm / scale / SEEN_PX)
+    factor = max(1.0, side_px / SEEN_PX)
     size = (max(1, round(width / factor)), max(1, round(height / factor)))
     small = cv2.resize(grey, size, interpolation=cv2.INTER_AREA)
     light = np.clip(255.0 * np.sqrt(np.maximum(small, 0.0)), 0, 255).astype(np.uint8)
@@ -235,14 +266,29 @@ class TaggedClamp:
         return abs(self.turned_deg) > TURNED_DEG
 
 
-def tagged_clamp(grey: Image, camera: Calibration) -> TaggedClamp | None:
+def tagged_clamp(grey: Image, camera: Calibration, rod: Pose) -> TaggedClamp | None:
     """Return where the rod leaves the clamp by the calibration's tag.
 
     None where the calibration has no tag, or it is not seen.
+
+    Parameters
+    ----------
+    grey : ndarray, shape (height, width), float32
+        Linear light.
+    camera : Calibration
+        Of the camera that took the photograph, with its tag.
+    rod : Pose
+        Where the rod itself seems to leave the clamp.
     """
     tag = camera.clamp_tag
-    seen = None if tag is None else find_tag(grey, camera, tag)
-    if tag is None or seen is None:
+    if tag is None:
+        return None
+    away = Pose(x_mm=0.0, y_mm=0.0, angle_deg=-tag.angle_deg).to_board(
+        np.array([[-tag.root_x_mm, -tag.root_y_mm]])
+    )
+    (near,) = camera.to_px(rod.to_board(away), height_mm=tag.height_mm)
+    seen = find_tag(grey, camera, tag, near)
+    if seen is None:
         return None
     root = np.array([[tag.root_x_mm, tag.root_y_mm]])
     (place,) = seen.pose.to_board(root)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -13,13 +14,14 @@ from ...core.errors import MagbendError
 from ..camera.calibration import Calibration
 from ..camera.find_tag import TaggedClamp, tagged_clamp
 from ..camera.oriented import oriented
+from ..curve.curve import Curve
 from ..edge.state import LostError
 from ..find.choose import find_rod, search_rod
 from ..find.coloured import shows_another
 from ..find.ground import View
 from ..find.rod import Candidate
 from ..find.track import Start, start_curve
-from ..measurement import Measurement, failure
+from ..measurement import Measurement, Pose, failure
 from ..picture.photo import Photo
 from .bare import flattened
 from .quality import OTHER_ROD, TIP_GOES_ON, doubts, refusal
@@ -205,7 +207,9 @@ def finish(
     if np.isfinite(sd_px) and not refined.settled:
         raise LostError("edges_lost", "the rod moved too far since the last frame")
     refusal(photo, view, refined, candidate)
-    result = measurement(refined, view, setting, _told(photo, setting))
+    result = measurement(
+        refined, view, setting, _told(photo, setting, refined.fit.curve)
+    )
     result = replace(result, inverted=view.sign < 0.0, mix=view.mix)
     return doubts(result, photo, view, refined, candidate, setting)
 
@@ -240,10 +244,16 @@ def _refined(
     return refined
 
 
-def _told(photo: Photo, setting: Setting) -> TaggedClamp | None:
+def _told(photo: Photo, setting: Setting, curve: Curve) -> TaggedClamp | None:
     """Return what a tag on the clamp tells, where there is one."""
     camera = setting.calibration
-    return None if camera is None else tagged_clamp(photo.grey, camera)
+    if camera is None or camera.clamp_tag is None:
+        return None
+    root, ahead = camera.to_mm(curve.points[:2], height_mm=setting.axis_height_mm)
+    x, y = ahead - root
+    heading = math.degrees(math.atan2(y, x))
+    rod = Pose(x_mm=float(root[0]), y_mm=float(root[1]), angle_deg=heading)
+    return tagged_clamp(photo.grey, camera, rod)
 
 
 def _start(grey: Image, candidate: Candidate, sign: float, blur: float = 1.0) -> Start:
