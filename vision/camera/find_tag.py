@@ -84,16 +84,14 @@ def find_tag(
     if corners is None:
         return None
     for _ in range(2):
-        crossings = [
-            _crossings(grey, corners[k], corners[(k + 1) % 4]) for k in range(4)
-        ]
-        if min(map(len, crossings)) < STATIONS // 4:
+        crossings, edge = _crossings(grey, corners)
+        if np.bincount(edge, minlength=4).min() < STATIONS // 4:
             return None
-        edges = [camera.to_mm(points, height_mm=tag.height_mm) for points in crossings]
+        points = camera.to_mm(crossings, height_mm=tag.height_mm)
         start = camera.to_mm(corners, height_mm=tag.height_mm)
         if not np.all(np.isfinite(start)):
             return None
-        square, covariance = _fitted(edges, start)
+        square, covariance = _fitted(points, _OUTWARD[edge], start)
         corners = camera.to_px(_square(square), height_mm=tag.height_mm)
     scale = camera.mm_per_px(
         (float(corners[:, 0].mean()), float(corners[:, 1].mean())),
@@ -153,26 +151,32 @@ def _corners(grey: Image, tag: ClampTag, side_px: float) -> Array | None:
     return np.asarray((corners + 0.5) * ratio - 0.5)
 
 
-def _crossings(grey: Image, start: Array, end: Array) -> Array:
-    """Return where an edge of the marker is at half its light, shape (n, 2), px."""
-    along = (end - start) / np.hypot(*(end - start))
-    outward = np.array([along[1], -along[0]])
-    side = float(np.hypot(*(end - start)))
-    reach = min(REACH_PX, 0.075 * side)
+def _crossings(grey: Image, corners: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Return where the marker's edges are at half their light, and on which edge.
+
+    Shapes (n, 2), px, and (n,); edge k goes from corner k to the next.
+    """
+    along = np.roll(corners, -1, axis=0) - corners
+    side = np.hypot(*along.T)[:, None]
+    along /= side
+    outward = np.column_stack([along[:, 1], -along[:, 0]])
+    reach = min(REACH_PX, 0.075 * float(side.min()))
     across = np.arange(-reach, reach + STEP_PX / 2.0, STEP_PX)
     t = np.linspace(CORNERS, 1.0 - CORNERS, STATIONS) * side
-    points = start + t[:, None, None] * along + across[None, :, None] * outward
+    stations = corners[:, None] + t[..., None] * along[:, None]
+    points = stations[:, :, None] + across[:, None] * outward[:, None, None]
     light = _sampled(grey, points)
-    edge = max(2, len(across) // 6)
-    dark, white = light[:, :edge].mean(axis=1), light[:, -edge:].mean(axis=1)
-    half = 0.5 * (dark + white)[:, None]
-    above = light >= half
-    at = np.argmax(above, axis=1)
-    good = (white - dark > 0.3 * np.median(white - dark)) & (at > 0) & above.any(axis=1)
-    rows, at = np.flatnonzero(good), at[good]
-    low, high = light[rows, at - 1], light[rows, at]
-    place = across[at - 1] + STEP_PX * (half[rows, 0] - low) / (high - low)
-    return np.asarray(start + t[rows, None] * along + place[:, None] * outward)
+    flat = max(2, len(across) // 6)
+    dark, white = light[..., :flat].mean(axis=2), light[..., -flat:].mean(axis=2)
+    step, half = white - dark, 0.5 * (dark + white)
+    above = light >= half[..., None]
+    at = np.argmax(above, axis=2)
+    clear = step > 0.3 * np.median(step, axis=1, keepdims=True)
+    edge, row = np.nonzero(clear & (at > 0) & above.any(axis=2))
+    at = at[edge, row]
+    low, high = light[edge, row, at - 1], light[edge, row, at]
+    place = across[at - 1] + STEP_PX * (half[edge, row] - low) / (high - low)
+    return stations[edge, row] + place[:, None] * outward[edge], edge
 
 
 def _sampled(grey: Image, points: Array) -> Array:
@@ -191,17 +195,16 @@ _OUTWARD = np.radians([0.0, -90.0, 180.0, 90.0])
 """Where the printed top, right, bottom and left edge look, from the tag's x axis."""
 
 
-def _fitted(edges: list[Array], corners: Array) -> tuple[Array, Array]:
+def _fitted(points: Array, looks: Array, corners: Array) -> tuple[Array, Array]:
     """Fit a square to points on its four edges: middle, angle, side, and covariance.
 
-    Gauss-Newton on the distances n.(p - c) - side / 2 along each edge's normal n.
+    `looks` is where the edge of each point looks, from the tag's x axis. Gauss-Newton
+    on the distances n.(p - c) - side / 2 along each edge's normal n.
     """
     top = 0.5 * (corners[0] + corners[1]) - corners.mean(axis=0)
     square = np.array(
         [*corners.mean(axis=0), math.atan2(top[1], top[0]), 2.0 * np.hypot(*top)]
     )
-    points = np.concatenate(edges)
-    looks = np.repeat(_OUTWARD, [len(edge) for edge in edges])
     used = np.ones(len(points), dtype=bool)
     for _ in range(4):
         angle = square[2] + looks
@@ -212,7 +215,8 @@ def _fitted(edges: list[Array], corners: Array) -> tuple[Array, Array]:
         slopes = np.column_stack(
             [normal, -np.sum(tangent * away, axis=1), np.full(len(points), 0.5)]
         )
-        change, *_ = np.linalg.lstsq(slopes[used], left[used], rcond=None)
+        some = slopes[used]
+        change = np.linalg.solve(some.T @ some, some.T @ left[used])
         square = square + change
         left = left - slopes @ change
         scatter = 1.4826 * float(np.median(np.abs(left))) + 1e-9
