@@ -121,7 +121,8 @@ def test_inverted_frames_measure_the_same():
 
 def test_theta_and_kappa_are_the_derivatives_of_the_shape():
     one = frame("arc", 120.0, 3)
-    table = extract(as_photo(one.image), one.truth.calibration).points
+    found = extract(as_photo(one.image), one.truth.calibration)
+    table = found.points
     s = table["s_mm"]
     theta = np.unwrap(
         np.arctan2(np.gradient(table["y_mm"], s), np.gradient(table["x_mm"], s))
@@ -130,7 +131,9 @@ def test_theta_and_kappa_are_the_derivatives_of_the_shape():
     np.testing.assert_allclose(
         table["kappa_per_mm"][5:-5], np.radians(120) / 30, rtol=0.05
     )
-    assert table["theta_rad"][0] == table["x_mm"][0] == table["y_mm"][0] == 0.0
+    assert table["x_mm"][0] == table["y_mm"][0] == 0.0
+    # The frame has the clamp's direction, which the rod alone does not tell.
+    assert abs(table["theta_rad"][0]) < np.radians(found.clamp_angle_sd_deg)
 
 
 def test_known_joints_sharpen_the_curvature():

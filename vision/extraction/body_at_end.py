@@ -44,8 +44,8 @@ _AS_DARK, _EVEN = 0.3, 0.2
 def check_ends(photo: Photo, view: View, refined: Refined) -> None:
     """Refuse a rod in a clamp whose root is on bare paper, or whose tip meets a body.
 
-    A clamp may be as light as the paper in the mix of colours that tells the rod best,
-    or in lightness, but hardly in both.
+    A clamp may be as light as the paper in the light that tells the rod best, but
+    hardly in all colours.
 
     Raises
     ------
@@ -54,8 +54,7 @@ def check_ends(photo: Photo, view: View, refined: Refined) -> None:
     """
     if refined.clamp is None or refined.rough:
         return
-    views = (view, replace(view, grey=photo.grey))
-    if all(_on_paper(each, refined) for each in views[: 1 if view.mix is None else 2]):
+    if _on_paper([view], refined) and _on_paper(_colours(photo, view), refined):
         raise LostError(
             "no_clamp",
             "what looks like a rod begins on bare paper: no clamp is seen there",
@@ -73,13 +72,27 @@ def check_ends(photo: Photo, view: View, refined: Refined) -> None:
         )
 
 
-def _on_paper(view: View, refined: Refined) -> bool:
-    """Whether there is paper, in no shade, on both sides behind a root."""
+def _colours(photo: Photo, view: View) -> list[View]:
+    """Return the light of each colour, or the grey of a picture that has none."""
+    colour = photo.colour()
+    light = [photo.grey] if colour is None else np.moveaxis(colour, 2, 0)
+    return [replace(view, grey=np.ascontiguousarray(each)) for each in light]
+
+
+def _on_paper(views: list[View], refined: Refined) -> bool:
+    """Whether there is paper, in no shade, on both sides behind a root.
+
+    What is seen in several colours is as far from the paper as all of them tell.
+    """
     all_along = np.array([0.0, refined.tip.s])
-    paper, contrast = _paper_beside(view, refined, all_along, 0.8)
-    sides = _beside(view, refined, -_BEHIND * refined.typical_width)
-    off = np.abs(np.median(sides, axis=1) - paper)
-    return bool(np.all(off < _OTHER * contrast))
+    behind = -_BEHIND * refined.typical_width
+    off, rod = [], []
+    for view in views:
+        paper, contrast = _paper_beside(view, refined, all_along, 0.8)
+        off.append(np.median(_beside(view, refined, behind), axis=1) - paper)
+        rod.append(contrast)
+    away = np.linalg.norm(off, axis=0)
+    return bool(np.all(away < _OTHER * np.linalg.norm(rod)))
 
 
 def _tip_at_body(view: View, refined: Refined) -> bool:

@@ -85,8 +85,8 @@ def _levels(
     """Return where the darker of two levels begins and ends; None where one is seen."""
     dark, paper = float(profile.min()), float(profile.max())
     body = np.flatnonzero(profile < dark + _EDGE * (paper - dark))
-    if not body.size:
-        return None
+    if body[0] == 0 or body[-1] == len(profile) - 1:
+        return None  # a soft shade, that no edge was taken for
     low, high = across[body[[0, -1]]]
     inside = (across > low + clear) & (across < high - clear)
     if not inside.any() or np.ptp(profile[inside]) < _STEP * (paper - dark):
