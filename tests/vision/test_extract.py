@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -381,6 +381,7 @@ def test_no_array_makes_it_raise(pixels):
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10_000))
+@example(632)
 def test_no_scribble_makes_it_raise(seed):
     rng = np.random.default_rng(seed)
     picture = np.full((120, 160), 230, np.uint8)

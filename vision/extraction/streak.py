@@ -140,6 +140,8 @@ def _both_sides(across: Array, profile: Array) -> tuple[float, ...] | None:
     Of the streak both edges, in which its blur lies; likeness is the narrower part's
     width over the wider one's. None where there are not two such parts.
     """
+    if np.isnan(profile).all():
+        return None  # the part lies beyond the picture
     dark, paper = float(np.nanmin(profile)), float(np.nanquantile(profile, 0.9))
     below = np.concatenate([[False], profile < 0.5 * (dark + paper), [False]])
     runs = np.flatnonzero(np.diff(below.astype(np.int8))).reshape(-1, 2)
