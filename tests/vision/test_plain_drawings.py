@@ -88,6 +88,14 @@ def test_a_black_rod_ends_before_its_deep_shade():
     assert np.hypot(*(found.tip_px - axis(40.0)[0][-1])) < 1.0
 
 
+def test_a_paler_half_beside_its_darker_shade_is_not_lost_without_a_word():
+    low, high = strip(20.0, -0.5, 0.5).reshape(2, -1, 2)
+    pale = np.vstack([low[200:], high[:200]])
+    light = {"rod": BLACK, "turn_deg": 20.0, "shade_px": (2, 9), "deep": 0.4}
+    assert "tip_goes_on" in measured(**light, over=[((0.5,) * 3, pale)]).flags
+    assert "tip_goes_on" not in measured(**light).flags
+
+
 def bar(at, angle_deg, length, width):
     """Return the corners of a bar about a point."""
     t = np.radians(angle_deg)

@@ -26,6 +26,13 @@ PALER_TIP, TINTED_TIP = 0.12, 0.15
 """Step to either side beyond the tip, over the rod's, that a shade does not have; and
 one in the difference of two colours, over the paper's light in each."""
 
+_FURTHER = (1.5, 2.5)
+"""So many widths beyond a tip a paler part still goes on, and hardly a tip's shade."""
+
+_NEAR_EDGE, _SHARP, _SHIFT = 0.15, 0.7, 0.2
+"""To either side of its edge, in widths; what of the step over twice that lies between,
+at least: a soft shade has half; and how far the edge may lie aside, in widths."""
+
 FAR, _ASIDE = 10.0, 2.5
 """How far beyond the tip another part of the rod is looked for, and how far to either
 side of straight on, in widths."""
@@ -50,7 +57,7 @@ def tip_goes_on(photo: Photo, view: View, refined: Refined) -> bool:
     curve, width = refined.fit.curve, refined.typical_width
     far = np.linspace(max(0.4 * width, 4.0), 1.2 * width + 4.0, 9)
     step, contrast = _beyond_tip(view.grey, curve, width, far, view.sign)
-    if step > PALER_TIP * contrast:
+    if max(step, _sharp_edge(view, curve, width)) > PALER_TIP * contrast:
         return True
     close = clear_of(refined.blur) + np.linspace(0.0, 0.2 * width, 9)
     half = round(2.0 * width) + 12
@@ -80,6 +87,25 @@ def _beyond_tip(
     contrast = median(before[::4].ravel()) - median(before[1:4].ravel())
     step = np.minimum(beyond[0], beyond[4]) - beyond[1:4].max(axis=0)
     return quantile(step, 0.25), contrast
+
+
+def _sharp_edge(view: View, curve: Curve, width: float) -> float:
+    """Return the step of an edge that goes on well beyond a tip, in line with one side.
+
+    The other side may lie in the rod's own shade, darker than a paler part itself.
+    """
+    s = curve.s[-1] + np.linspace(*_FURTHER, 9) * width
+    best = 0.0
+    for side in (-1.0, 1.0):
+        for shift in np.linspace(-_SHIFT, _SHIFT, 5):
+            offsets = 0.5 + shift + np.array([-2.0, -1.0, 1.0, 2.0]) * _NEAR_EDGE
+            deep, inner, outer, away = lanes(
+                view.grey, curve, s, side * offsets * width, view.sign
+            )
+            step = outer - inner
+            sharp = step > _SHARP * (away - deep)
+            best = max(best, quantile(np.where(sharp, step, 0.0), 0.25))
+    return best
 
 
 def goes_on_after_gap(
