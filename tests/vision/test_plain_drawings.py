@@ -73,6 +73,24 @@ def test_the_front_of_a_clamps_shade_is_not_the_clamp(shade_px, clamp):
     assert abs(found.length_mm - 20.0) < 0.08
 
 
+@pytest.mark.parametrize(
+    ("rod", "turn_deg", "shade_px", "deep", "clamp"),
+    [
+        ((0.3, 0.1, 0.05), 80.0, (4, 11), 0.65, 0.12),
+        ((0.1, 0.1, 0.1), 25.0, (6, 8), 0.49, 0.05),
+        ((0.3, 0.1, 0.05), 5.0, (4, -10), 0.61, 0.12),
+    ],
+)
+def test_nor_is_that_of_a_shade_shorter_than_half_a_width(
+    rod, turn_deg, shade_px, deep, clamp
+):
+    found = measured(
+        rod=rod, turn_deg=turn_deg, shade_px=shade_px, deep=deep, clamp=clamp
+    )
+    assert abs(found.clamp_px[0] - ROOT[0]) < 1.5
+    assert abs(found.length_mm - 20.0) < 0.08
+
+
 @pytest.mark.parametrize(("rod", "deep"), [(RED, 0.66), (BLACK, 0.68)])
 def test_a_rod_is_measured_without_the_shade_along_it(rod, deep):
     found = measured(rod=rod, turn_deg=5.0, shade_px=(-6, 17), deep=deep)

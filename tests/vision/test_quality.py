@@ -39,13 +39,13 @@ def measured(seed=0):
 
 def test_root_put_short_of_the_clamp_is_doubted():
     photo, _, refined = measured()
-    assert not _goes_on(photo, refined)
+    assert not _goes_on(photo, refined, 0.0)
     whole = refined.fit.curve
     short = Curve(
         s=whole.s[60:] - whole.s[60], points=whole.points[60:],
         theta=whole.theta[60:], kappa=whole.kappa[60:],
     )  # fmt: skip
-    assert _goes_on(photo, replace(refined, fit=replace(refined.fit, curve=short)))
+    assert _goes_on(photo, replace(refined, fit=replace(refined.fit, curve=short)), 0.0)
 
 
 def test_direction_that_leaves_the_tip_unsure_is_doubted():

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ...core.jit import njit
 from ..curve.curve import Curve
+from ..curve.robust import median
 from .edges import clear_of
 from .step_line import (
     SPAN,
@@ -176,6 +177,32 @@ def _front(
         np.concatenate(seen), s, across, line, crossing, blur=blur,
         inner=_CLAMP_SPAN * blur, outer=SPAN * blur,
     )  # fmt: skip
+
+
+def goes_on_at(grey: Image, curve: Curve, s: Array, width: float) -> bool:
+    """Whether a dark line between two lighter sides goes on at places behind a root.
+
+    Parameters
+    ----------
+    grey : ndarray, shape (height, width), float32
+        Linear light.
+    curve : Curve
+        The axis, from its root.
+    s : ndarray, shape (n,)
+        Arc lengths, px; those behind the root are negative.
+    width : float
+        Width of the rod, px.
+    """
+    beside = 0.5 * width + 4.0
+    across = np.array([-beside, -0.2 * width, 0.0, 0.2 * width, beside])
+    before = lanes(grey, curve, np.linspace(1.0, 3.0, 9) * width, across)
+    rod, paper = median(before[1:4].ravel()), median(before[::4].ravel())
+    if paper == rod:
+        return False
+    light = np.array([median(lane) for lane in lanes(grey, curve, s, across)])
+    light = (light - rod) / (paper - rod)
+    lighter = min(light[0], light[4]) - max(light[1:4].max(), 0.0)
+    return bool(light[1:4].max() < 0.15 and lighter > 0.12)
 
 
 @njit(cache=True)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..curve.curve import Curve
 from ..curve.robust import median
-from .clamp import ClampLines, between, find_clamp
+from .clamp import ClampLines, between, find_clamp, goes_on_at
 from .edges import clear_of
 from .state import LostError, Root, Seen, State
 from .step_line import EndFace
@@ -88,6 +88,11 @@ def _clamp_lines(
     if lines.face is None and lines.front is None:
         return between_places(low, high, _SHADED * contrast)
     outer = _shade_line(lines, state, seen)
+    if outer is None and lines.front is not None:
+        near = clear_of(max(state.blur, state.clamp_blur)) + state.face_px
+        at = lines.front.s - near - np.linspace(0.0, 2.0, 5)
+        if goes_on_at(grey, state.curve, at, width):
+            outer, low = lines.front.s, min(low, lines.front.s - 1.55 * width)
     if outer is None:
         return lines
     outer -= clear_of(state.blur) + _LAG_PX

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..curve.robust import median, quantile
+from ..edge.clamp import goes_on_at
+from ..edge.edges import clear_of
 from ..edge.state import LostError
 from ..edge.step_line import lanes
 from ..edge.white import SOME
@@ -132,7 +134,9 @@ def doubts(
     # By a tag the place may be known all the same.
     if root_hidden(refined, setting) and result.clamp_sd_mm > 0.5 * HIDDEN_MM:
         flags.append("root_hidden")
-    if candidate.root == "clamp" and _goes_on(photo, refined):
+    if candidate.root == "clamp" and _goes_on(
+        photo, refined, setting.face_px(refined.fit.curve)
+    ):
         flags.append("clamp_doubtful")
     if not refined.rough and tip_goes_on(photo, view, refined):
         flags.append(TIP_GOES_ON)
@@ -178,20 +182,14 @@ def direction_is_doubtful(sd_deg: float, length_mm: float) -> bool:
     return bool(np.radians(sd_deg) * length_mm > TURN_MM)
 
 
-def _goes_on(photo: Photo, refined: Refined) -> bool:
+def _goes_on(photo: Photo, refined: Refined, face_px: float) -> bool:
     """Whether a dark line between two lighter sides goes on behind the clamp's line.
 
     Then that line may be the border of a shadow (or the clamp has an open groove).
     """
-    width = refined.typical_width
-    beside = 0.5 * width + 4.0
-    across = np.array([-beside, -0.2 * width, 0.0, 0.2 * width, beside])
-    curve = refined.fit.curve
-    behind, before = (
-        lanes(photo.grey, curve, np.linspace(first, last, 9) * width, across)
-        for first, last in ((-1.6, -1.0), (1.0, 3.0))
+    width, curve = refined.typical_width, refined.fit.curve
+    near = max(0.3 * width, 2.0 * clear_of(refined.blur) + face_px)
+    return any(
+        goes_on_at(photo.grey, curve, -np.linspace(first, last, 9), width)
+        for first, last in ((near, near + 0.2 * width), (width, 1.6 * width))
     )
-    rod, paper = median(before[1:4].ravel()), median(before[::4].ravel())
-    light = np.array([median(lane) for lane in behind])
-    light = (light - rod) / (paper - rod)
-    return bool(light[1:4].max() < 0.15 and min(light[0], light[4]) > 0.3)
