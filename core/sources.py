@@ -98,7 +98,8 @@ class Cuboid(Posed):
     Parameters
     ----------
     sides_mm : tuple of float
-        Along its own x, y, z, in mm. A single number is a cube.
+        Along its own x, y, z, in mm: z along the axis, x in the table's plane. A single
+        number is a cube.
     remanence_T : float
         In T; negative turns the poles round.
     """

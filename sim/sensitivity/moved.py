@@ -85,8 +85,13 @@ def _number(
     key: str, index: int | None, owner: Any, put: Callable[[Any], Case], name: str
 ) -> Move:
     """Return the move of a number, or of element `index` of a vector, of a record."""
-    known = {one.name for one in fields(owner)}
+    known = {one.name: one.type for one in fields(owner)}
     value: Any = getattr(owner, key) if key in known else None
+    if value is not None and known[key] in (int, "int"):
+        raise InputError(
+            f"{name} must be a number that can change by a little; instead it is a "
+            "count, which has no derivative"
+        )
     if isinstance(value, tuple) and index is not None and index < len(value):
         start = value[index]
     elif isinstance(value, (int, float)) and index is None:

@@ -244,6 +244,7 @@ def _of_uniform(row: Array, key: str, source: Uniform) -> bool:
 def _unknown(name: str) -> InputError:
     return InputError(
         f"parameter must be one that this case has, such as E_MPa[0], side_mm, "
-        f"clamp_angle_deg, flux_mT (uniform field) or gap_mm (magnet); instead "
-        f"received {name!r}"
+        f"clamp_angle_deg, flux_mT (uniform field), gap_mm (magnet), or, of a source, "
+        f"its strength, angle or place, not its size (source[0].axis_angle_deg); "
+        f"instead received {name!r}"
     )

@@ -105,6 +105,12 @@ def found_tangent() -> np.ndarray:
     return solve_spatial(ROD, FIELD, support=HELD, points=2).tangent[-1]
 
 
+def test_the_plane_says_what_it_lacks_of_a_source() -> None:
+    with pytest.raises(InputError, match="its strength, angle or place, not its size"):
+        sensitivities(gmc(2), Cuboid(sides_mm=40.0, remanence_T=1.0, gap_mm=50.0),
+                      parameters=["source[0].sides_mm[0]"])  # fmt: skip
+
+
 def test_what_cannot_be_asked_is_said() -> None:
     for name, words in (
         ("E_MPa[2]", "one of 2 sections"),
@@ -114,6 +120,7 @@ def test_what_cannot_be_asked_is_said() -> None:
         ("source[0].kind", "such as E_MPa"),
         ("gravity_m_s2", "such as E_MPa"),
         ("remanence_T", "such as E_MPa"),
+        ("source[1].turns", "is a count"),
     ):
         with pytest.raises(InputError, match=words):
             sensitivities(ROD, FIELD, parameters=[name], support=HELD)
