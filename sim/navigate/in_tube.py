@@ -166,6 +166,7 @@ class TubeState:
     rest: Rest
     moved: float
     energy: float
+    overlap: float
     rubbed: float = 0.0
     push: float = 0.0
 
@@ -242,6 +243,7 @@ def at_rest(
         rest=rest,
         moved=float(np.linalg.norm(moved, axis=1).max()),
         energy=rest.energy + case.guided(insertion_mm),
+        overlap=float(rest.overlap),
         rubbed=rest.rubbed,
     )
 

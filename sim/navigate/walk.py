@@ -31,7 +31,13 @@ FINEST = 256
 JUMP = 4.0
 """A move beyond this many steps is looked at closely."""
 CAREFUL = 16
-"""A rod that moves so fast without a snap is followed by this part of a step."""
+"""A rod that moves so fast without a snap, or stores more than the push gives, is
+followed by this part of a step."""
+DOUBT = 64
+"""A rod whose contacts were not all found is followed by this part of a step."""
+TRUSTED = 1e-5
+"""Overlap, in L, beyond which they were not: such a rod may give way where one between
+all of its contacts would not."""
 LOSS = 1e-4
 """A snap loses more than this part of the energy."""
 HIDDEN = 0.5
@@ -55,6 +61,7 @@ class AtRest(Protocol):
     rubbed: float
     moved: float
     push: float
+    overlap: float
 
 
 class OfCase(Protocol):
@@ -101,6 +108,8 @@ class Walk(ABC, Generic[C, S]):
         self.events: list[Event] = []
         self.outcome = INSERTED
         self.rubbed = 0.0
+        self.doubted_mm = math.nan
+        """Insertion of the last state that finer steps were to confirm."""
         self.turns: list[float] = []
         """Insertions that were gone to, and left again."""
 
@@ -139,7 +148,9 @@ class Walk(ABC, Generic[C, S]):
             finest = step <= self.step_mm / FINEST
             new = self._try(now, goal, last_try=finest)
             if new is None and finest:
-                return False
+                new = self._doubted(now, way)
+                if new is None:
+                    return False
             if new is None:
                 step *= 0.5
                 continue
@@ -181,23 +192,41 @@ class Walk(ABC, Generic[C, S]):
         outcome, new = self._come(old, goal_mm, SOFT)
         taken = abs(goal_mm - old.insertion_mm)
         moved = new.moved * self.case.length_mm
-        fast = moved > JUMP * taken and taken > self.step_mm / CAREFUL
-        if outcome == SETTLED and not fast and not self._leaps(old, new):
-            return new
+        careless = taken > self.step_mm / CAREFUL
+        fast = careless and moved > JUMP * taken
+        free = not self.steps[-1].contacts
+        peaks = (careless or free) and self._hides(old, new)
+        if outcome == SETTLED and not (fast or peaks or self._leaps(old, new)):
+            if taken <= self.step_mm / DOUBT or new.overlap <= TRUSTED:
+                return new
+            self.doubted_mm = goal_mm
         if not last_try:
             return None
-        again, risen = outcome, new if outcome == SETTLED else None
+        again = outcome
+        risen: list[S] = []
         for soft in (SOFT, *(SOFTER if self.steps[-1].contacts else ())):
             if soft != SOFT:
                 again, new = self._come(old, goal_mm, soft)
-            if again == SETTLED and not self._rises(old, new):
+            if again != SETTLED:
+                continue
+            if not self._rises(old, new):
                 return new
-            risen = new if risen is None and again == SETTLED else risen
-        if risen is not None:
-            return risen
+            risen.append(new)
+        if risen:
+            return min(risen, key=lambda state: state.energy + state.rubbed)
         lost = OVERPOWERED if self.case.flux(goal_mm)[0] != UNIFORM else LOST
         self.outcome = WHY.get(again) or WHY.get(outcome) or lost
         return None
+
+    def _doubted(self, old: S, way: float) -> S | None:
+        """Return the state that was doubted, where finer steps find none before it."""
+        if not way * (self.doubted_mm - old.insertion_mm) > 0.0:
+            return None
+        outcome, new = self._come(old, self.doubted_mm, SOFT)
+        if outcome != SETTLED or self._leaps(old, new):
+            return None
+        self.outcome = INSERTED
+        return new
 
     def _leaps(self, old: S, new: S) -> bool:
         """Return whether a step moves the rod far, and energy is lost or won by it."""
@@ -220,8 +249,6 @@ class Walk(ABC, Generic[C, S]):
 
         So it is where a tip meets an edge head on, buckles, and slips off it.
         """
-        if new.insertion_mm - old.insertion_mm < self.step_mm / CAREFUL:
-            return False
         taken = (new.insertion_mm - old.insertion_mm) / self.case.length_mm
         work = abs(0.5 * (old.push + new.push) * taken)
         return self._rises(old, new) and -self._released(old, new) > HIDDEN * work
@@ -269,7 +296,9 @@ class Walk(ABC, Generic[C, S]):
                     moved_mm=new.moved * self.case.length_mm,
                 )
             )
-        elif self._hides(old, new):
+        elif at_mm - old.insertion_mm > self.step_mm / CAREFUL and self._hides(
+            old, new
+        ):
             what = "the push was larger within the step; take finer ones"
             self.events.append(Event(kind="coarse", insertion_mm=at_mm, what=what))
         for name in self._passed(self.steps[-1], step):

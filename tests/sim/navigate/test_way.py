@@ -46,16 +46,14 @@ def test_the_field_chooses_the_branch(sign, branch):
     assert passage.outcome == "inserted"
 
 
-@pytest.mark.parametrize(("step_mm", "coarse"), [(0.5, True), (0.05, False)])
-def test_a_tip_that_meets_an_edge_head_on_carries_eulers_load_or_it_says_so(
-    step_mm, coarse
-):
+@pytest.mark.parametrize("step_mm", [1.0, 0.5, 0.05])
+def test_a_tip_that_meets_an_edge_head_on_carries_eulers_load(step_mm):
     """A column of two sections, one end clamped, the other free to move aside."""
     fork = read_lumen(LUMENS / "fork.toml")
     passage = navigate(
         gmc(2), fork, NOTHING, step_mm=step_mm, way_mm=14.0, refine=False
     )
-    assert any(event.kind == "coarse" for event in passage.events) is coarse
+    assert all(event.kind != "coarse" for event in passage.events)
     soft, stiff = 10e6 * 1e-12 / 12.0, 15e6 * 1e-12 / 12.0  # E I, N m2; 10 and 3.5 mm
     load_N = brentq(
         lambda load: (
@@ -65,10 +63,7 @@ def test_a_tip_that_meets_an_edge_head_on_carries_eulers_load_or_it_says_so(
         ),
         5e-3, 18e-3,
     )  # fmt: skip
-    if coarse:
-        assert passage.most("push_N") < 0.1 * load_N
-    else:
-        assert passage.most("push_N") == pytest.approx(load_N, rel=1e-3)
+    assert passage.most("push_N") == pytest.approx(load_N, rel=1e-3)
 
 
 def test_the_mirrored_lumen_gives_the_mirrored_rod():
@@ -153,8 +148,8 @@ def test_a_push_beyond_its_limit_ends_the_way():
 def test_a_blind_end_makes_the_rod_snap_and_it_snaps_back_later():
     """Forth it snaps near 24.5 mm, back near 22.8 mm: between, two states each."""
     passage = navigate(
-        gmc(2), blind(), UniformField(flux_mT=5.0), way_mm=(24.52, 24.0, 22.0),
-        refine=False,
+        gmc(2), blind(), UniformField(flux_mT=5.0),
+        way_mm=(22.0, 24.0, 24.52, 24.0, 22.0), refine=False,
     )  # fmt: skip
     turn = next(i for i, s in enumerate(passage.steps) if s.insertion_mm == 24.52)
     out, back = passage.steps[:turn], passage.steps[turn:]
@@ -181,20 +176,32 @@ def test_a_blind_end_makes_the_rod_snap_and_it_snaps_back_later():
         assert abs(step.shape[1]).max() < 2.0
 
 
+def large_snaps(step_mm: float):
+    passage = navigate(
+        gmc(2), blind(), UniformField(flux_mT=5.0), way_mm=(24.5, 22.5),
+        step_mm=step_mm, refine=False,
+    )  # fmt: skip
+    return [e for e in passage.snaps if abs(e.released_Nmm) > 0.05]
+
+
 @pytest.mark.slow
 def test_folds_are_where_they_are_whatever_the_steps():
     """To 1/256 of a step; and no rod snaps to a state of more energy."""
     folds = []
-    for step_mm in (0.3, 0.2):
-        passage = navigate(
-            gmc(2), blind(), UniformField(flux_mT=5.0), way_mm=(24.5, 22.5),
-            step_mm=step_mm, refine=False,
-        )  # fmt: skip
-        large = [e for e in passage.snaps if abs(e.released_Nmm) > 0.05]
+    for step_mm in (0.4, 0.3, 0.2):
+        large = large_snaps(step_mm)
         assert all(event.released_Nmm > 0.0 for event in large)
         folds.append([event.insertion_mm for event in large])
     assert len(folds[0]) == 2
-    assert folds[0] == pytest.approx(folds[1], abs=3e-3)
+    for others in folds[1:]:
+        assert folds[0] == pytest.approx(others, abs=3e-3)
+
+
+@pytest.mark.slow
+def test_no_rod_goes_back_uphill_to_the_state_that_it_left():
+    forth, home = large_snaps(0.25)
+    assert forth.released_Nmm > 0.0
+    assert home.released_Nmm > 0.0
 
 
 def test_a_rod_that_is_pulled_onto_the_magnet_is_named():
