@@ -111,7 +111,9 @@ def test_a_clamped_rod_buckles_and_leaves_the_wall_at_the_published_loads():
     assert loads[before[-1]] == pytest.approx(16.0, abs=0.25)
     # Then the longer part alone, half a wave with its end flat on the wall, carries
     # 4 pi^2 over its own length: y' = B (1 - cos k s) + C sin k s for any C.
-    for step, k2 in list(zip(passage.steps, loads, strict=True))[before[-1] + 10 : -20]:
+    for step, k2 in zip(passage.steps, loads, strict=True):
+        if not aside + 0.02 < step.insertion_mm < 30.32:
+            continue
         (contact,) = step.contacts
         share = max(contact.s_mm, step.insertion_mm - contact.s_mm) / step.insertion_mm
         assert k2 * share**2 == pytest.approx(4.0, rel=0.01)  # slopes are finite
