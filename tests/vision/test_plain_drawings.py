@@ -38,7 +38,9 @@ def strip(turn_deg, low, high):
     return np.vstack([points + low * aside, (points + high * aside)[::-1]])
 
 
-def drawn(*, rod, turn_deg, shade_px=(0, 0), deep=0.0, clamp=0.2, over=()):
+def drawn(
+    *, rod, turn_deg, shade_px=(0, 0), deep=0.0, clamp=0.2, over=(), blur_px=1.0
+):  # fmt: skip
     """Return a photograph of a rod whose shade is moved by `shade_px`.
 
     `over` are pairs of a colour and corners, drawn over all else.
@@ -52,7 +54,7 @@ def drawn(*, rod, turn_deg, shade_px=(0, 0), deep=0.0, clamp=0.2, over=()):
     light = np.full((SIZE[1], SIZE[0], 3), 0.7) * (1.0 - deep * shade)
     for colour, corners in ((rod, body), ((clamp,) * 3, CLAMP), *over):
         light += (np.array(colour) - light) * covered(corners)
-    light = cv2.GaussianBlur(light, (0, 0), 1.0)
+    light = cv2.GaussianBlur(light, (0, 0), blur_px)
     light += np.random.default_rng(3).normal(0.0, 0.004, light.shape)
     pixels = 255.0 * (1.055 * np.clip(light, 0.004, 1.0) ** (1 / 2.4) - 0.055)
     return as_photo(np.rint(pixels).astype(np.uint8))
@@ -98,6 +100,30 @@ def test_a_rod_is_measured_without_the_shade_along_it(rod, deep):
     truth, _ = axis(5.0)
     away = [np.hypot(*(truth - point).T).min() for point in found.points_px[:-1]]
     assert max(away) < 1.0
+
+
+def test_a_rod_that_cannot_be_told_from_its_shade_is_refused():
+    """Its edges were sought again on the outside of both: 7 px wider, without doubt."""
+    photo = drawn(rod=RED, turn_deg=40.0, shade_px=(4, 9), deep=0.66)
+    found = extract(photo, SCALE, rod_height_mm=0.0)
+    assert found.flags == ("edges_lost",)
+
+
+@pytest.mark.parametrize("deep", [0.0, 0.5])
+@pytest.mark.parametrize(
+    ("rod", "turn_deg", "shade_px", "blur_px"),
+    [(BLACK, 30.0, (6, 14), 5.0), (RED, 9.0, (4, 12), 3.2)],
+)
+def test_a_front_that_is_blurred_into_its_shade_is_in_doubt(
+    rod, turn_deg, shade_px, blur_px, deep
+):
+    photo = drawn(
+        rod=rod, turn_deg=turn_deg, shade_px=shade_px, deep=deep, blur_px=blur_px
+    )
+    found = extract(photo, SCALE, rod_height_mm=0.0)
+    assert found.ok, found.reason
+    assert ("clamp_doubtful" in found.flags) == (deep > 0.0)
+    assert (abs(found.clamp_px[0] - ROOT[0]) < 1.5) == (deep == 0.0)
 
 
 def test_a_black_rod_ends_before_its_deep_shade():

@@ -44,6 +44,9 @@ PALE = 0.3
 """Light of a rod, over the paper's, above which it may be a shade, or a face of
 something: all levels and colours are then looked at."""
 
+BOTH = 1.25
+"""Width over that of a rod alone, above which it is of rod and shade once more."""
+
 SMOOTH = 0.12
 """Blur for a rough rod, in widths: its two edges do not feel each other yet."""
 
@@ -178,7 +181,14 @@ def measure_candidate(
         grey = np.asarray(cv2.GaussianBlur(grey, (0, 0), blur))
         soft = _start(grey, candidate, sign, blur)
         start = replace(soft, rough=True, width=start.width)
-    return finish(photo, replace(view, grey=grey), start, candidate, setting)
+    result = finish(photo, replace(view, grey=grey), start, candidate, setting)
+    if alone is not None and result.width_px > BOTH * alone.width_px:
+        raise LostError(
+            "edges_lost",
+            "the rod cannot be told from the deep shade beside it: light it from more "
+            "sides",
+        )
+    return result
 
 
 def finish(

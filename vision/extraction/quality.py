@@ -48,6 +48,11 @@ BLURRED_PX, BLURRED = 1.8, 0.08
 SHADE_PX = 0.04
 """Pull of a shade on the midline, before correction, above which it is named."""
 
+UNRESOLVED, HARD_SHADE, SMEARED = 0.21, 0.025, 1.4
+"""Blur, in widths, above which a clamp's front and its shade are seen as one line: an
+edge then takes half the rod's width to rise. With less they may be, where a shade pulls
+by so many widths, and the line is so much more blurred than the rod."""
+
 
 def refusal(photo: Photo, view: View, refined: Refined, candidate: Candidate) -> None:
     """Refuse a refined rod that contradicts what was found at first.
@@ -134,8 +139,10 @@ def doubts(
     # By a tag the place may be known all the same.
     if root_hidden(refined, setting) and result.clamp_sd_mm > 0.5 * HIDDEN_MM:
         flags.append("root_hidden")
-    if candidate.root == "clamp" and _goes_on(
-        photo, refined, setting.face_px(refined.fit.curve)
+    pull = quantile(refined.shaded[refined.good], 0.9)
+    face_px = setting.face_px(refined.fit.curve)
+    if candidate.root == "clamp" and (
+        _front_in_shade(refined, pull) or _goes_on(photo, refined, face_px)
     ):
         flags.append("clamp_doubtful")
     if not refined.rough and tip_goes_on(photo, view, refined):
@@ -147,7 +154,7 @@ def doubts(
         flags.append("clipped" if known else "overexposed")
     if refined.blur > max(BLURRED_PX, BLURRED * result.width_px):
         flags.append("blurred")
-    if quantile(refined.shaded[refined.good], 0.9) > SHADE_PX:
+    if pull > SHADE_PX:
         flags.append("shadow")
     unsure = refined.good.mean() < 0.8 or refined.fit.noise > 0.02 * result.width_px
     if refined.rough or unsure:
@@ -157,6 +164,15 @@ def doubts(
     if _length_is_off(result, setting):
         flags.append("length_mismatch")
     return replace(result, flags=tuple(flags))
+
+
+def _front_in_shade(refined: Refined, pull: float) -> bool:
+    """Whether a clamp's front and its shade may be blurred into one line."""
+    if refined.clamp is None or pull < SHADE_PX:
+        return False
+    smeared = refined.clamp.blur > SMEARED * refined.blur
+    width = refined.typical_width
+    return refined.blur > UNRESOLVED * width or (pull > HARD_SHADE * width and smeared)
 
 
 def _length_is_off(result: Measurement, setting: Setting) -> bool:
