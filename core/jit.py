@@ -12,6 +12,7 @@ import functools
 import hashlib
 import os
 import threading
+import warnings
 from collections.abc import Callable
 from contextvars import ContextVar
 from pathlib import Path
@@ -181,7 +182,9 @@ def once(task: Callable[[], Result], *, patience: int | None = None) -> Result:
 
     token = _calls_left.set([PATIENCE if patience is None else patience])
     try:
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            # Machine code says nothing of empty slices either.
+            warnings.simplefilter("ignore", RuntimeWarning)
             return task()
     except _Unfit:
         pass

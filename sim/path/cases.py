@@ -75,6 +75,11 @@ def _load(rod: Specimen, field: Field, support: Support, value: float) -> Case:
 
 
 def _insertion(rod: Specimen, field: Field, support: Support, value: float) -> Case:
+    if not value > 0.0:
+        raise InputError(
+            f"insertion_mm must be above 0: it is the length in mm of the section at "
+            f"the root; instead received {value:g}"
+        )
     first = replace(rod.sections[0], length_mm=value)
     return replace(rod, sections=(first, *rod.sections[1:])), field, support
 
@@ -104,6 +109,7 @@ def _changed(field: Field, moved: list[bool], key: str, value: float) -> Field:
 
 def _no_such(field: Field, key: str) -> InputError:
     return InputError(
-        f"{key} must belong to a source of the field for a path; instead the field has "
-        f"the sources {kinds_of(field)}"
+        f"{key} must belong to a source of the field for a path; of this one's sources "
+        f"({kinds_of(field)}) none has it, or they stand where centre_mm says: follow "
+        f"another quantity, or leave out centre_mm of what shall move"
     )

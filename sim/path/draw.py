@@ -81,9 +81,8 @@ def draw_path(file: File, path: Path, *, title: str) -> None:
     tips.legend(fontsize=8, frameon=False)
     for axes in (shapes, tips):
         axes.grid(visible=True, linewidth=0.3)
-    figure.suptitle(
-        f"{title}: dots are where the followed equilibrium ends", fontsize=9
-    )
+    ends = ": dots are where the followed equilibrium ends" if path.folds else ""
+    figure.suptitle(title + ends, fontsize=9)
     save(figure, file)
 
 

@@ -7,6 +7,7 @@ import pickle
 import subprocess
 import sys
 import threading
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +69,12 @@ def test_long_work_goes_on_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_python_refuses_is_left_to_machine_code() -> None:
     assert once(lambda: quotient(1.0, 0.0)) == math.inf
     assert once(lambda: quotient(np.float64(1.0), 0.0)) == math.inf
+
+
+def test_python_says_no_more_of_what_is_empty_than_machine_code() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert math.isnan(once(lambda: float(np.nanmedian(np.full(3, np.nan)))))
 
 
 def test_errors_of_the_task_itself_pass_through_and_leave_no_trace() -> None:
