@@ -79,6 +79,8 @@ _EXPLAINED = {
     "length_mismatch": "the rod is not as long as it should be: another rod, another "
     "free length, a wrong --rod-height-mm, or a camera that was moved since it was "
     "calibrated",
+    "width_mismatch": "the rod is not as wide as its specimen: another rod, or a hard "
+    "shade was measured with it",
     "tag_differs": "the tag and the rod itself tell different clamps: the tag came "
     "loose, the rod was clamped anew, or the clamp's line is that of a shade",
     "tag_not_seen": "the calibration knows a tag on the clamp, and it is not seen; "

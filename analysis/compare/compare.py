@@ -52,7 +52,7 @@ EXTRA_COLUMNS = (
 LENGTH_TOLERANCE = 0.05
 """Relative difference of length above which the rod counts as another one."""
 
-WIDTH_TOLERANCE = 0.12
+WIDTH_TOLERANCE = 0.08
 """Relative difference of width and side above which a flag is raised; the paper's own
 remeasured sides differ by up to 7 % from the nominal ones."""
 

@@ -371,6 +371,15 @@ def test_wrong_nominal_length_is_flagged():
     assert "length_mismatch" in wrong.flags
 
 
+def test_a_rod_much_wider_than_its_specimen_is_flagged():
+    one = frame()
+    photo = as_photo(one.image)
+    wide = extract(photo, one.truth.calibration).width_mm
+    for side_mm, is_off in ((0.95 * wide, False), (0.88 * wide, True)):
+        found = extract(photo, one.truth.calibration, side_mm=side_mm)
+        assert ("width_mismatch" in found.flags) == is_off
+
+
 @settings(max_examples=40, deadline=None)
 @given(arrays(np.uint8, st.tuples(st.integers(16, 60), st.integers(16, 60))))
 def test_no_array_makes_it_raise(pixels):

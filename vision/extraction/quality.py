@@ -29,6 +29,8 @@ from .setting import Setting
 Array = NDArray[np.float64]
 
 LENGTH_TOLERANCE = 0.02
+SIDE_TOLERANCE = 0.08
+"""A print's side is a few percent off; more is shade measured with it, or another rod."""
 
 TURN_MM = 0.15
 """What the standard deviation of the direction at the clamp may do to the tip."""
@@ -163,6 +165,8 @@ def doubts(
         flags.append("ragged_tip")
     if _length_is_off(result, setting):
         flags.append("length_mismatch")
+    if _side_is_off(result, setting):
+        flags.append("width_mismatch")
     return replace(result, flags=tuple(flags))
 
 
@@ -183,6 +187,14 @@ def _length_is_off(result: Measurement, setting: Setting) -> bool:
     if setting.length_sd_mm is not None:
         tolerance = 3.0 * math.hypot(setting.length_sd_mm, result.length_sd_mm)
     return abs(result.length_mm - setting.length_mm) > tolerance
+
+
+def _side_is_off(result: Measurement, setting: Setting) -> bool:
+    """Whether a rod is wider or thinner than its specimen by more than a print is."""
+    if setting.side_mm is None or not math.isfinite(result.width_mm):
+        return False
+    tolerance = SIDE_TOLERANCE * setting.side_mm + 3.0 * result.width_sd_mm
+    return abs(result.width_mm - setting.side_mm) > tolerance
 
 
 def _height_is_assumed(setting: Setting) -> bool:
