@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 LENGTH_TOLERANCE = 0.02
 SIDE_TOLERANCE = 0.08
-"""A print's side is a few percent off; more is shade measured with it, or another rod."""
+"""A print's side is a few percent off; more is a shade measured with it."""
 
 TURN_MM = 0.15
 """What the standard deviation of the direction at the clamp may do to the tip."""
