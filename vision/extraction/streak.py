@@ -78,13 +78,13 @@ def whole_rod(view: View, candidate: Candidate) -> tuple[View, Candidate]:
         both = _both_sides(across, np.median(light[:, part], axis=1))
         if both is not None:
             found.append((s[part].mean(), *both))
-    at, low, first, last, high, second, dark = np.array(found).reshape(-1, 7).T
+    one = replace(candidate, rivalled=candidate.rivalled or candidate.halved)
+    if len(found) < _MOST_PARTS * _PARTS:
+        return view, one
+    at, low, first, last, high, second, dark = np.array(found).T
     wide = median(high - low)
-    steady = len(at) >= _MOST_PARTS * _PARTS and (
-        max(np.std(low), np.std(high)) < _STEADY * wide
-    )
-    if not steady:
-        return view, replace(candidate, rivalled=candidate.rivalled or candidate.halved)
+    if max(np.std(low), np.std(high)) >= _STEADY * wide:
+        return view, one
     points, theta = curve.at(s)
     normals = np.column_stack([-np.sin(theta), np.cos(theta)])
 
