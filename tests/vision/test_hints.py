@@ -70,6 +70,7 @@ def test_of_two_rods_the_one_that_is_meant(frame, plain):
     assert not extract(photo, frame.truth.calibration).ok
     found = measure_hinted(photo, setting, hints_of(plain))
     assert found.tip_mm == pytest.approx(plain.tip_mm, abs=0.05)
+    assert "other_rod" in found.flags  # it lies across
 
 
 def test_a_ruler_gives_the_scale(frame, plain):

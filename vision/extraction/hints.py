@@ -147,7 +147,7 @@ def _between(photo: Photo, setting: Setting, points: Array) -> Measurement:
         width = max(3.0, share * length)
         rod = Candidate(
             points_px=path, width_px=width, length_px=length, root=root,
-            contacts=1, ratio=0.0,
+            contacts=1, ratio=0.0, told=True,
         )  # fmt: skip
         view = best_view(photo, path, width)
         try:

@@ -87,7 +87,7 @@ def refusal(photo: Photo, view: View, refined: Refined, candidate: Candidate) ->
         )
     check_ends(photo, view, refined)
     at = None if refined.rough else crossed_at(view, refined)
-    if at is not None:
+    if at is not None and not candidate.told:
         raise LostError(
             "touches_object",
             "something as dark as the rod crosses or touches it, at "
@@ -136,7 +136,8 @@ def doubts(
     after_gap = not refined.rough and goes_on_after_gap(
         view, refined.fit.curve, result.width_px
     )
-    if candidate.rivalled or after_gap:
+    crossed = candidate.told and crossed_at(view, refined) is not None
+    if candidate.rivalled or after_gap or crossed:
         flags.append(OTHER_ROD)
     # By a tag the place may be known all the same.
     if root_hidden(refined, setting) and result.clamp_sd_mm > 0.5 * HIDDEN_MM:

@@ -65,6 +65,8 @@ class Candidate:
         Whether another thing in the picture may be the rod as well.
     halved : bool
         Whether another thing lies so close along it that both may be one rod.
+    told : bool
+        Whether a person gave its ends.
     """
 
     points_px: Array
@@ -76,6 +78,7 @@ class Candidate:
     leaves: bool = False
     rivalled: bool = False
     halved: bool = False
+    told: bool = False
 
     @property
     def slenderness(self) -> float:
