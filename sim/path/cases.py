@@ -109,7 +109,7 @@ def _changed(field: Field, moved: list[bool], key: str, value: float) -> Field:
 
 def _no_such(field: Field, key: str) -> InputError:
     return InputError(
-        f"{key} must belong to a source of the field for a path; of this one's sources "
-        f"({kinds_of(field)}) none has it, or they stand where centre_mm says: follow "
-        f"another quantity, or leave out centre_mm of what shall move"
+        f"{key} must belong to a source of the field for a path, and not to one that "
+        f"stands where centre_mm says: follow another quantity, or leave out centre_mm "
+        f"of what shall move; instead the field has the sources {kinds_of(field)}"
     )

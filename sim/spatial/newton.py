@@ -41,9 +41,9 @@ POLISH = 4
 """Most marches by 2 n steps that correct a pose: one, unless the root moves far more
 than the tip."""
 MOST_STEPS = 3000.0
-MOST_LOADS, PACE = 4000, 100
-"""Trials of a load on one way, and after how many is looked at the way made: a branch
-that asks for more at that pace is lost."""
+MOST_LOADS = 4000
+"""Trials of a load on one way; a branch that asks for more is lost. How far it came
+after fewer tells nothing: a rod nearly against a field creeps only where it buckles."""
 LOST, STEEP = -2, 1e6
 """Index where a branch is lost, fold or not: the root moves so many times as the tip,
 and what rounding leaves of the tip's pose no longer fixes the rest."""
@@ -218,32 +218,30 @@ def newton(rod, field, load, n, Rc, R, r, first, goal, J, held):  # type: ignore
 
 
 @njit(cache=True)
-def follow(rod, field, n, Rc, R, r, goal, J, held):  # type: ignore[no-untyped-def]
+def follow(rod, field, bends, n, Rc, R, r, goal, J, held):  # type: ignore[no-untyped-def]
     """Follow the equilibrium from no load, at (R, r), to full load.
 
     Returns the Morse index and the load reached.
 
-    Predictions go along the parabola through the last three poses: a tangent would
-    leave the plane where a planar rod begins to swing, and Newton's matrix is singular.
-    Where the root moves a million times as far as the tip, they must be that close.
+    Predictions go along the secant, or with `bends` of 1 along the parabola through the
+    last three poses: a tangent would leave the plane where a planar rod begins to
+    swing, and Newton's matrix is singular. A parabola misses where a rod that is all
+    but symmetric buckles; a secant, where the root moves a million times as far as the
+    tip.
 
     A branch changes its index at single loads only: a step over which it changes is
     taken again in halves, until it is too short to have jumped to another branch.
     """
     Rb, rb = R.copy(), r.copy()
     secant, bend, x = np.zeros((6, 1)), np.zeros((6, 1)), np.zeros((6, 1))
-    load, last, jump, index, then, eager = 0.0, 0.0, 0.125, 0, 0.0, True
-    for k in range(MOST_LOADS):
+    load, last, jump, index, eager = 0.0, 0.0, 0.125, 0, True
+    for _ in range(MOST_LOADS):
         if load == 1.0:
             return index, 1.0
-        if k % PACE == PACE - 1:
-            if (load - then) * (MOST_LOADS / PACE) < 1.0 - load:
-                break
-            then = load
         jump = min(jump, 1.0 - load)
         ahead = 1.0 if jump == 1.0 - load else load + jump
         Rb[:], rb[:] = R, r
-        x[:] = jump * secant + jump * (jump + last) * bend
+        x[:] = jump * secant + bends * jump * (jump + last) * bend
         there = -1
         if _move(R, r, x) < LONGEST:
             held[3][0] = 0.0
@@ -299,10 +297,14 @@ def solve_pose(rod, field, n, Rc, R, r, goal, held):  # type: ignore[no-untyped-
     if found and (start or morse_index(rod, field, 1.0, coarse, R0, r0) == 0):
         index = 0 if end else morse_index(rod, field, 1.0, coarse, R, r)
     if index != 0:
-        R[:], r[:] = R0, r0
-        index, load = follow(rod, field, n, Rc, R, r, goal, J, held)
+        load, lost = 0.0, True
+        for bends in (0.0, 1.0):
+            if lost:
+                R[:], r[:] = R0, r0
+                index, load = follow(rod, field, bends, n, Rc, R, r, goal, J, held)
+                steep = load < 1.0 and np.max(np.abs(J)) > STEEP
+                lost = index == LOST or steep
         if load < 1.0:
-            lost = index == LOST or np.max(np.abs(J)) > STEEP
             return LOST if lost else -1, load, 0.0
     for k in range(POLISH):
         moved = math.inf if k > 0 else 0.0
