@@ -36,7 +36,7 @@ def free_controls(panel: Served) -> None:
 def expect(locator: Any) -> Any:
     from playwright.sync_api import expect as of
 
-    of.set_options(timeout=30_000)
+    of.set_options(timeout=60_000)
     return of(locator)
 
 
