@@ -31,7 +31,7 @@ def _corner(s, u, v, w):  # type: ignore[no-untyped-def]
 def gradients(w):  # type: ignore[no-untyped-def]
     """Set the gradients where the lanes look."""
     for i in range(LANES):
-        x, y, z = w[LOOK + 12 * LANES + i], w[LOOK + 13 * LANES + i], 0.0
+        x, y = w[LOOK + 12 * LANES + i], w[LOOK + 13 * LANES + i]
         z = w[LOOK + 14 * LANES + i]
         sx = math.copysign(1.0, x)
         sy = math.copysign(1.0, y)

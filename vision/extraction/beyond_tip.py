@@ -57,7 +57,8 @@ def tip_goes_on(photo: Photo, view: View, refined: Refined) -> bool:
     curve, width = refined.fit.curve, refined.typical_width
     far = np.linspace(max(0.4 * width, 4.0), 1.2 * width + 4.0, 9)
     step, contrast = _beyond_tip(view.grey, curve, width, far, view.sign)
-    if max(step, _sharp_edge(view, curve, width)) > PALER_TIP * contrast:
+    paler = PALER_TIP * contrast
+    if step > paler or _sharp_edge(view, curve, width) > paler:
         return True
     close = clear_of(refined.blur) + np.linspace(0.0, 0.2 * width, 9)
     half = round(2.0 * width) + 12
@@ -95,17 +96,13 @@ def _sharp_edge(view: View, curve: Curve, width: float) -> float:
     The other side may lie in the rod's own shade, darker than a paler part itself.
     """
     s = curve.s[-1] + np.linspace(*_FURTHER, 9) * width
-    best = 0.0
-    for side in (-1.0, 1.0):
-        for shift in np.linspace(-_SHIFT, _SHIFT, 5):
-            offsets = 0.5 + shift + np.array([-2.0, -1.0, 1.0, 2.0]) * _NEAR_EDGE
-            deep, inner, outer, away = lanes(
-                view.grey, curve, s, side * offsets * width, view.sign
-            )
-            step = outer - inner
-            sharp = step > _SHARP * (away - deep)
-            best = max(best, quantile(np.where(sharp, step, 0.0), 0.25))
-    return best
+    edge = 0.5 + np.linspace(-_SHIFT, _SHIFT, 5)[:, None]
+    right = (edge + np.array([-2.0, -1.0, 1.0, 2.0]) * _NEAR_EDGE).ravel() * width
+    light = lanes(view.grey, curve, s, np.concatenate([-right, right]), view.sign)
+    deep, inner, outer, away = light.reshape(10, 4, -1).swapaxes(0, 1)
+    step = outer - inner
+    sharp = step > _SHARP * (away - deep)
+    return max(quantile(one, 0.25) for one in np.where(sharp, step, 0.0))
 
 
 def goes_on_after_gap(
