@@ -116,6 +116,8 @@ def navigate(
         print_json(data | {"steps": [_row(step) for step in passage.steps]})
     else:
         _print(data, passage)
+        if branches and not passage.branches:
+            say("  branches        none: the rod did not snap")
 
 
 def _field(

@@ -12,7 +12,7 @@ from typing import Any
 
 from ... import sim
 from ...core.errors import InputError
-from ..compare.compare import field_of
+from ..compare.field import field_of
 from ..runs.data import RunData, Step
 
 Values = dict[str, float]

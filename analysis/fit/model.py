@@ -14,7 +14,7 @@ from ... import sim
 from ...core.cross_section import ALL_SIZES
 from ...core.errors import InputError
 from ...core.specimen import Section, Specimen
-from ..compare.compare import flux_at_tip_mT
+from ..compare.field import flux_at_tip_mT
 from ..compare.metrics import position_at
 from .fields import field_at, is_read, strength
 from .nuisance import Owner

@@ -16,14 +16,8 @@ import numpy as np
 from ... import sim
 from ...core.errors import InputError, MagbendError
 from ...core.specimen import Specimen
-from ..compare.compare import (
-    Comparison,
-    RunComparison,
-    field_of,
-    flux_angle_deg,
-    remanence_sd_T,
-    usable_flux,
-)
+from ..compare.compare import Comparison, RunComparison
+from ..compare.field import field_of, flux_angle_deg, remanence_sd_T, usable_flux
 from ..fit.nuisance import FRAME_ANGLE_SD_DEG, Nuisance
 from ..fit.result import FitResult
 

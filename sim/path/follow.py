@@ -115,9 +115,15 @@ def _waypoints(
             f"{quantity} must be at least two waypoints in {unit}; instead received "
             f"{shown(given[quantity])}"
         )
+    path = [finite(value, quantity, unit) for value in stops]
+    if len(set(path)) == 1:
+        raise InputError(
+            f"{quantity} must change along a path; all {len(path)} waypoints are "
+            f"{path[0]:g} {unit}"
+        )
     kept: Any = {name: given[name] for name in stops_of}
     return (
         quantity,
-        [finite(value, quantity, unit) for value in stops],
+        path,
         {name: finite(kept[name], name, QUANTITIES[name].unit) for name in kept},
     )

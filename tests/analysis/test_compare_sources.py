@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from analysis_factory import write_run
+from analysis_factory import GAPS_MM, write_run
 from typer.testing import CliRunner
 
 from magbend import sim
-from magbend.analysis import load_run
-from magbend.analysis.compare.compare import compare_run, flux_at_tip_mT
+from magbend.analysis import RunData, fit_runs, load_run
+from magbend.analysis.compare.compare import compare_run
+from magbend.analysis.compare.field import flux_at_tip_mT
 from magbend.analysis.report.budget import tip_budget
 from magbend.cli.main import app
+from magbend.core.errors import InputError
 
 SEVERAL = sim.Field(
     sim.Cuboid(sides_mm=30.0, remanence_T=1.3),
@@ -34,7 +37,8 @@ PLACED = sim.Field(
 def test_the_true_rod_before_its_sources_is_found_exact(
     tmp_path: Path, sources: sim.Field
 ) -> None:
-    run = load_run(write_run(tmp_path / "a", sources=sources))
+    gaps_mm = GAPS_MM if sources.follows_gap else GAPS_MM[:1]
+    run = load_run(write_run(tmp_path / "a", sources=sources, gaps_mm=gaps_mm))
     done = compare_run(run, sources=sources)
     for one in done.of("magnet"):
         assert one.ok
@@ -51,6 +55,22 @@ def test_the_true_rod_before_its_sources_is_found_exact(
     causes = {line.cause for line in tip_budget(done)}
     assert ("gap" in causes) is sources.follows_gap
     assert "uniform instead of true field" in causes
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        lambda run: compare_run(run, sources=PLACED),
+        lambda run: fit_runs([run], sources=PLACED, judged=False),
+    ],
+    ids=["compare", "fit"],
+)
+def test_sources_that_stand_still_are_refused_where_the_gap_changed(
+    tmp_path: Path, task: Callable[[RunData], object]
+) -> None:
+    """All steps were taken for steps in one field, without a word."""
+    with pytest.raises(InputError, match="goes from 30 to 80 mm; leave centre_mm and"):
+        task(load_run(write_run(tmp_path / "a", gaps_mm=(80.0, 30.0))))
 
 
 def test_a_report_names_the_sources_it_was_given(tmp_path: Path) -> None:

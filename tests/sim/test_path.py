@@ -222,6 +222,7 @@ def test_other_quantities_change_what_they_name() -> None:
         (lambda: follow_path(gmc(2), CUBE), "waypoints of one of gap_mm"),
         (lambda: follow_path(gmc(2), CUBE, gap_mm=(60.0,)), "at least two waypoints"),
         (lambda: follow_path(gmc(2), CUBE, gap_mm=(60.0, math.nan)), "finite"),
+        (lambda: follow_path(gmc(2), CUBE, gap_mm=(60.0, 60.0)), "must change along"),
         (lambda: follow_path(gmc(2), CUBE, gap_mm=(60.0, -5.0)), "received -5.0"),
         (lambda: follow_path(gmc(2), CUBE, insertion_mm=(5.0, 0.0)), "insertion_mm"),
         (lambda: follow_path(gmc(2), CUBE, flux_mT=(1.0, 2.0)), "flux_mT must belong"),

@@ -45,9 +45,10 @@ def test_a_passage_is_printed_and_written(tmp_path):
     out = tmp_path / "passage"
     text = run(
         "navigate", BEND, "--gmc", "2", "--way-mm", "12", "--step-mm", "1",
-        "--out", str(out),
+        "--out", str(out), "--branches",
     )  # fmt: skip
     assert "GMC 2 in 90 degree bend: inserted" in text
+    assert "branches        none: the rod did not snap" in text
     heads = (out / "steps.csv").read_text().splitlines()[0].split(",")
     assert heads[:2] == ["insertion_mm", "push_N"]
     assert Centreline.from_csv(out / "shape.csv").length_mm == pytest.approx(12.0)
