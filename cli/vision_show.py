@@ -81,6 +81,8 @@ _EXPLAINED = {
     "calibrated",
     "width_mismatch": "the rod is not as wide as its specimen: another rod, or a hard "
     "shade was measured with it",
+    "colour_mismatch": "what was measured has another colour than the specimen: its "
+    "shade, or another thing; look at the overlay",
     "tag_differs": "the tag and the rod itself tell different clamps: the tag came "
     "loose, the rod was clamped anew, or the clamp's line is that of a shade",
     "tag_not_seen": "the calibration knows a tag on the clamp, and it is not seen; "

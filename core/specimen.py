@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TypeVar
@@ -25,6 +26,7 @@ DEVIATIONS = {
     "natural_curvature_sd_per_mm": "1/mm",
 }
 """Standard deviations that a specimen may state, and their units."""
+_COLOUR = re.compile("#[0-9a-fA-F]{6}")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,6 +142,9 @@ class Specimen:
         Standard deviations of what was measured.
     recipe : mapping, optional
         What the material was mixed from: names and amounts; kept as pairs.
+    colour : str, optional
+        As a picture of it on white paper shows it, ``#rrggbb``: tells the rod from its
+        shade and from other things in a photograph.
 
     Raises
     ------
@@ -167,6 +172,7 @@ class Specimen:
     density_sd_kg_m3: float | None = None
     natural_curvature_sd_per_mm: float | None = None
     recipe: tuple[tuple[str, float | str], ...] = ()
+    colour: str | None = None
     cross_sections: tuple[CrossSection, ...] = field(
         init=False, repr=False, compare=False
     )
@@ -188,6 +194,11 @@ class Specimen:
         for name, unit in DEVIATIONS.items():
             if (given := getattr(self, name)) is not None:
                 store(self, **{name: within(given, 0.0, 1e9, name, unit)})
+        if self.colour is not None and not _COLOUR.fullmatch(str(self.colour)):
+            raise InputError(
+                "colour must be red, green and blue in hexadecimal digits, such as "
+                f"#c8af8c; instead received {shown(self.colour)}"
+            )
 
     def _store_sizes(self) -> None:
         """Store the sizes of the shape, and what the camera sees as the side."""

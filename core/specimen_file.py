@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeVar
 
 from pydantic import ConfigDict, Field, NonNegativeFloat, PositiveFloat
 
 from .cross_section import ALL_SIZES, SIZES
+from .errors import ConfigError, InputError
 from .magnet import Magnet, Vector
 from .profile import profile_sections
 from .specimen import Section, Specimen
 from .toml import FileModel, read_toml
+
+Built = TypeVar("Built")
 
 PARTS = ("section", "profile")
 """Keys by which a rod is divided."""
@@ -65,6 +69,7 @@ class SpecimenModel(FileModel):
     density_sd_kg_m3: NonNegativeFloat | None = None
     natural_curvature_sd_per_mm: NonNegativeFloat | None = None
     recipe: dict[str, float | str] = Field(default_factory=dict)
+    colour: str | None = None
     section: list[SectionModel] = Field(default_factory=list)
     profile: ProfileModel | None = None
 
@@ -128,7 +133,7 @@ def read_specimen(path: Path) -> Specimen:
     ConfigError
         One sentence with file, line and key.
     """
-    return read_toml(path, SpecimenModel).specimen()
+    return _built(path, read_toml(path, SpecimenModel).specimen)
 
 
 def read_magnet(path: Path) -> Magnet:
@@ -139,7 +144,15 @@ def read_magnet(path: Path) -> Magnet:
     ConfigError
         One sentence with file, line and key.
     """
-    return read_toml(path, MagnetModel).magnet()
+    return _built(path, read_toml(path, MagnetModel).magnet)
+
+
+def _built(path: Path, build: Callable[[], Built]) -> Built:
+    """Return what a file describes; what is wrong with it is said of the file."""
+    try:
+        return build()
+    except InputError as error:
+        raise ConfigError(f"{path}: {error}") from None
 
 
 def specimen_dict(specimen: Specimen) -> dict[str, object]:

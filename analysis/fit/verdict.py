@@ -24,6 +24,7 @@ DOUBTFUL, CONTRADICTED = 0.05, 0.001
 
 SERIOUS_FLAGS = (
     "length_mismatch", "direction_doubtful", "joints_doubtful", "width_mismatch",
+    "colour_mismatch",
 )  # fmt: skip
 """Doubts of a photograph's measurement that a fit shares."""
 

@@ -92,6 +92,7 @@ def test_a_file_gives_the_specimen_back(shape: str, tmp_path: Path) -> None:
         density_sd_kg_m3=50.0,
         remanence_sd_mT=0.4, natural_curvature_per_mm=1e-3, density_kg_m3=2000.0,
         natural_curvature_sd_per_mm=1e-4, recipe={"NdFeB": 2.0, "PCL": 1.0},
+        colour="#c8af8c",
     )  # fmt: skip
     path = tmp_path / "specimen.json"
     path.write_text(json.dumps(specimen_dict(given)), encoding="utf-8")

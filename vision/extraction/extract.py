@@ -24,7 +24,7 @@ from ..find.track import Start, start_curve
 from ..measurement import Measurement, Pose, failure
 from ..picture.photo import Photo
 from .bare import flattened
-from .quality import OTHER_ROD, TIP_GOES_ON, doubts, refusal
+from .quality import OTHER_COLOUR, OTHER_ROD, TIP_GOES_ON, doubts, refusal
 from .refine import Refined, refine
 from .setting import Setting
 from .specimen_frame import measurement
@@ -128,13 +128,13 @@ def _measure(photo: Photo, setting: Setting) -> Measurement:
 
 def _is_sure(quick: Measurement, rod: Candidate) -> bool:
     """Whether one level of lightness may have shown the whole rod, and no shade."""
-    doubts = {TIP_GOES_ON, "clamp_at_border"} & set(quick.flags)
+    doubts = {TIP_GOES_ON, OTHER_COLOUR, "clamp_at_border"} & set(quick.flags)
     return not doubts and rod.ratio < PALE
 
 
 def _doubted(quick: Measurement) -> Measurement:
     """Return what one level shows and all levels together do not."""
-    if {TIP_GOES_ON, "clamp_at_border", OTHER_ROD} & set(quick.flags):
+    if {TIP_GOES_ON, "clamp_at_border", OTHER_ROD, OTHER_COLOUR} & set(quick.flags):
         return quick
     return replace(quick, flags=(*quick.flags, OTHER_ROD))
 

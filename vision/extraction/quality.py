@@ -16,6 +16,7 @@ from ..edge.step_line import lanes
 from ..edge.white import SOME
 from ..find.ground import View
 from ..find.rod import Candidate
+from ..find.rod_colour import ALIKE, distance_from
 from ..measurement import Measurement
 from ..picture.photo import Photo
 from .beyond_tip import goes_on_after_gap, tip_goes_on
@@ -38,7 +39,7 @@ TURN_MM = 0.15
 SCALE = 5e-4
 """Doubt of the scale, for want of the camera's height, above which it is named."""
 
-TIP_GOES_ON, OTHER_ROD = "tip_goes_on", "other_rod"
+TIP_GOES_ON, OTHER_ROD, OTHER_COLOUR = "tip_goes_on", "other_rod", "colour_mismatch"
 
 OVER_PAPER, OVER_PAPER_ROUGH, BARE = 1.0, 3.0, 0.6
 """Widths of bare paper under an axis that are more than a speck, or than a gap in a
@@ -168,6 +169,8 @@ def doubts(
         flags.append("length_mismatch")
     if _side_is_off(result, setting):
         flags.append("width_mismatch")
+    if setting.colour and _colour_is_off(photo, refined, setting.colour):
+        flags.append(OTHER_COLOUR)
     return replace(result, flags=tuple(flags))
 
 
@@ -196,6 +199,12 @@ def _side_is_off(result: Measurement, setting: Setting) -> bool:
         return False
     tolerance = SIDE_TOLERANCE * setting.side_mm + 3.0 * result.width_sd_mm
     return abs(result.width_mm - setting.side_mm) > tolerance
+
+
+def _colour_is_off(photo: Photo, refined: Refined, colour: str) -> bool:
+    """Whether what was measured has another colour than the specimen."""
+    axis = refined.fit.curve.points[refined.good]
+    return distance_from(photo, colour)(axis) > ALIKE
 
 
 def _height_is_assumed(setting: Setting) -> bool:

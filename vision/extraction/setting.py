@@ -46,6 +46,8 @@ class Setting:
         How well that is known: then a length is off that differs by three deviations.
     side_mm : float or None
         Nominal side of its section: tells the rod from other long thin things.
+    colour : str or None
+        What it looks like on white paper, ``#rrggbb``: tells it from its shade too.
     clamp : {"auto", "none"}
         ``none`` also measures a rod that floats freely, from one end to the other.
     clamp_height_mm : float or None
@@ -69,6 +71,7 @@ class Setting:
     length_mm: float | None = None
     length_sd_mm: float | None = None
     side_mm: float | None = None
+    colour: str | None = None
     clamp: Clamp = "auto"
     clamp_height_mm: float | None = None
     clamp_square_sd_deg: float = CLAMP_SQUARE_SD_DEG
@@ -93,7 +96,7 @@ class Setting:
 
     def sought(self, size_px: tuple[int, int]) -> Sought:
         """Return what is known of the rod in a picture of a size."""
-        known = Sought(invert=self.invert, clamp=self.clamp)
+        known = Sought(invert=self.invert, clamp=self.clamp, colour=self.colour)
         if self.calibration is None:
             return known
         middle = (0.5 * size_px[0], 0.5 * size_px[1])
@@ -153,7 +156,7 @@ def with_specimen(setting: Setting, specimen: Specimen) -> Setting:
     setting : Setting
         What is known already; it is kept.
     specimen : Specimen
-        Tells side, length and joints.
+        Tells side, length, joints and colour.
     """
     own_sd_mm = specimen.length_sd_mm if setting.length_mm is None else None
     return replace(
@@ -162,6 +165,7 @@ def with_specimen(setting: Setting, specimen: Specimen) -> Setting:
         side_mm=setting.side_mm or specimen.side_mm,
         length_mm=setting.length_mm or specimen.length_mm,
         joints_mm=setting.joints_mm or specimen.joints_mm,
+        colour=setting.colour or specimen.colour,
     )
 
 

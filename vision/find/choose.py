@@ -14,6 +14,7 @@ from ..picture.photo import Photo
 from .binarise import Binary, binarise, rebinarise
 from .ground import FAINT, LEVELS, View, best_view, ground_distance
 from .rod import LEAST_SHARE, Candidate, find_candidates
+from .rod_colour import ALIKE, distance_from
 from .things import Thing, find_things
 
 Array = NDArray[np.float64]
@@ -69,15 +70,20 @@ class Sought:
         ``none`` takes a rod that floats freely too.
     width_px, length_px : float
         About how wide and long it is seen; 0 where that is not known.
+    colour : str or None
+        Its colour on white paper, ``#rrggbb``.
     """
 
     invert: bool | None = None
     clamp: Clamp = "auto"
     width_px: float = 0.0
     length_px: float = 0.0
+    colour: str | None = None
 
     def fits(self, rod: Candidate) -> bool:
-        """Whether a candidate has about the size of the rod."""
+        """Whether a candidate has about the size and colour of the rod."""
+        if rod.off_colour > ALIKE:
+            return False
         width, length = rod.width_px, rod.length_px
         return (not self.width_px or 1 / _SIZE < width / self.width_px < _SIZE) and (
             not self.length_px or 1 / _SIZE < length / self.length_px < _SIZE
@@ -134,7 +140,9 @@ def search_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
     things = find_things(binary, [1.0 - level for level in LEVELS], least)
     if not things:
         things = find_things(binary, [1.0 - level for level in FAINT], least)
-    if sought.width_px or sought.length_px:
+    if sought.colour:
+        _compare_colours(photo, sought.colour, things)
+    if sought.width_px or sought.length_px or sought.colour:
         things = [thing for thing in things if sought.fits(thing.best)] or things
     if not things:
         raise LostError("no_rod", "nothing in the picture is long and thin like a rod")
@@ -173,6 +181,15 @@ def search_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
             seen,
         )
     return rod, view
+
+
+def _compare_colours(photo: Photo, colour: str, things: list[Thing]) -> None:
+    """Note how far the colour of each thing, as seen at each level, is from one."""
+    distance = distance_from(photo, colour)
+    for thing in things:
+        thing.seen = [
+            replace(item, off_colour=distance(item.points_px)) for item in thing.seen
+        ]
 
 
 def _is_shade(one: Candidate, rod: Candidate) -> bool:

@@ -67,6 +67,8 @@ class Candidate:
         Whether another thing lies so close along it that both may be one rod.
     told : bool
         Whether a person gave its ends.
+    off_colour : float
+        Distance of its colour from the rod's, CIELAB; 0 where that is not known.
     """
 
     points_px: Array
@@ -79,6 +81,7 @@ class Candidate:
     rivalled: bool = False
     halved: bool = False
     told: bool = False
+    off_colour: float = 0.0
 
     @property
     def slenderness(self) -> float:
