@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from magbend.core.errors import ConfigError, InputError, VisionError
 from magbend.vision.camera.board import Board
+from magbend.vision.camera.bundle import Corners, default_prior, fit_bundle
 from magbend.vision.camera.calibrate import calibrate, calibrate_known_length
 from magbend.vision.camera.calibration import (
     Calibration,
@@ -209,6 +210,20 @@ def test_camera_height_given_by_hand_is_kept():
     assert found.camera_height_mm == pytest.approx(330.0, rel=0.02)
     assert found.camera_height_sd_mm < 0.025 * 330.0
     assert found.camera_height_source == "given"
+
+
+def test_a_camera_close_above_the_board_takes_its_height_by_hand():
+    """From a distant start the fit steps through poses below the board."""
+    truth = scene_camera(focal_px=1500.0, height_mm=46.3, target_mm=(17.5, -12.5))
+    board = 5.0 * np.stack(np.meshgrid(np.arange(1, 7), np.arange(1, 5)), axis=-1)
+    board_mm = board.reshape(-1, 2)
+    noise = np.random.default_rng(1).normal(0.0, 0.03, board_mm.shape)
+    corners = Corners(
+        board_mm=board_mm, points_px=truth.to_px(board_mm * [1.0, -1.0]) + noise
+    )
+    prior = default_prior(truth.image_size_px, views=1, distance_mm=46.0)
+    found = fit_bundle([corners], truth.image_size_px, prior)
+    assert found.focal_px == pytest.approx(1500.0, rel=0.03)
 
 
 LENS = {

@@ -256,9 +256,10 @@ def _prior_rows(unknowns: Array, prior: Prior) -> tuple[Array, Array]:
     if math.isnan(prior.distance_mm):
         return values, rows
     distance, gradient = _distance(unknowns)
-    sd = prior.distance_relative_sd
-    value = math.log(distance / prior.distance_mm) / sd
-    return np.append(values, value), np.vstack([rows, gradient / (distance * sd)])
+    # no logarithm: on its way a fit may put the camera below the board
+    sd = prior.distance_relative_sd * prior.distance_mm
+    value = (distance - prior.distance_mm) / sd
+    return np.append(values, value), np.vstack([rows, gradient / sd])
 
 
 def _distance(unknowns: Array) -> tuple[float, Array]:
