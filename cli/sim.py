@@ -18,7 +18,7 @@ from . import (
     sim_sweep,
 )
 from .console import group, print_json, say
-from .sim_case import field_of, only_with, rod_of
+from .sim_case import Gmc, Json, SourceFile, SpecimenFile, field_of, only_with, rod_of
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
@@ -45,10 +45,8 @@ SHAPE_EXAMPLE = (
 @app.command("shape", epilog=SHAPE_EXAMPLE)
 def shape(
     context: typer.Context,
-    gmc: Annotated[
-        int | None, typer.Option(help="Rod of the paper's Table 1, 1 to 7.")
-    ] = None,
-    specimen: Annotated[Path | None, typer.Option(help="Specimen file (TOML).")] = None,
+    gmc: Gmc = None,
+    specimen: SpecimenFile = None,
     remeasured: Annotated[
         bool, typer.Option("--remeasured", help="With --gmc: the sides as remeasured.")
     ] = False,
@@ -58,9 +56,7 @@ def shape(
     angle_deg: Annotated[
         float, typer.Option(help="Direction of the uniform field from +x, in deg.")
     ] = 90.0,
-    magnet: Annotated[
-        Path | None, typer.Option(help="Magnet or source file (TOML).")
-    ] = None,
+    magnet: SourceFile = None,
     gap_mm: Annotated[
         float | None, typer.Option(help="From the N face to the undeformed tip, in mm.")
     ] = None,
@@ -85,7 +81,7 @@ def shape(
         bool, typer.Option("--verify", help="Solve again by energy, and compare.")
     ] = False,
     out: Annotated[Path | None, typer.Option(help="Write the shape as CSV.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Predict the shape of a rod in a uniform field or before a magnet."""
     from ..core.files import output_file

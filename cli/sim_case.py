@@ -1,15 +1,20 @@
-"""The rod and the field that the options of ``magbend sim`` name."""
+"""The options that commands of ``magbend sim`` share, and what they name."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
     from ..sim import Field
+
+Gmc = Annotated[int | None, typer.Option(help="Rod of the paper's Table 1, 1 to 7.")]
+SpecimenFile = Annotated[Path | None, typer.Option(help="Specimen file (TOML).")]
+SourceFile = Annotated[Path | None, typer.Option(help="Magnet or source file (TOML).")]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 
 def only_with(context: typer.Context, option: str, *, owner: str, holds: bool) -> None:

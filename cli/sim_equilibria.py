@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import print_json, say
-from .sim_case import field_of, only_with, rod_of
+from .sim_case import Gmc, Json, SpecimenFile, field_of, only_with, rod_of
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
@@ -21,10 +21,8 @@ EXAMPLE = (
 
 def equilibria(
     context: typer.Context,
-    gmc: Annotated[
-        int | None, typer.Option(help="Rod of the paper's Table 1, 1 to 7.")
-    ] = None,
-    specimen: Annotated[Path | None, typer.Option(help="Specimen file (TOML).")] = None,
+    gmc: Gmc = None,
+    specimen: SpecimenFile = None,
     remeasured: Annotated[
         bool, typer.Option("--remeasured", help="With --gmc: the sides as remeasured.")
     ] = False,
@@ -51,7 +49,7 @@ def equilibria(
     figure: Annotated[
         Path | None, typer.Option(help="Draw shapes and branches: .svg, .pdf, .png.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Find every planar equilibrium of a weightless rod, stable or not."""
     from ..core.files import output_file

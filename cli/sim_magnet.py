@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import print_json, say
+from .sim_case import Json
 
 if TYPE_CHECKING:
     from ..sim import MagnetFit
@@ -37,7 +38,7 @@ def magnet(
     field_map: Annotated[
         Path | None, typer.Option("--map", help="Draw the field (SVG, PDF, PNG).")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Fit a magnet's remanence to readings on its axis, and judge each reading."""
     from ..sim import fit_magnet, paper_readings, read_readings

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import print_json, say
-from .sim_case import field_of, only_with, rod_of
+from .sim_case import Gmc, Json, SourceFile, SpecimenFile, field_of, only_with, rod_of
 
 if TYPE_CHECKING:
     from ..core.specimen import Specimen
@@ -25,10 +25,8 @@ EXAMPLE = (
 def navigate(
     context: typer.Context,
     lumen: Annotated[Path, typer.Argument(help="Lumen file (TOML).")],
-    gmc: Annotated[
-        int | None, typer.Option(help="Rod of the paper's Table 1, 1 to 7.")
-    ] = None,
-    specimen: Annotated[Path | None, typer.Option(help="Specimen file (TOML).")] = None,
+    gmc: Gmc = None,
+    specimen: SpecimenFile = None,
     field_mT: Annotated[
         float | None, typer.Option("--field-mT", help="Uniform flux density in mT.")
     ] = None,
@@ -38,9 +36,7 @@ def navigate(
     elevation_deg: Annotated[
         float, typer.Option(help="Angle of the uniform field above the xy plane.")
     ] = 0.0,
-    magnet: Annotated[
-        Path | None, typer.Option(help="Magnet or source file (TOML).")
-    ] = None,
+    magnet: SourceFile = None,
     gap_mm: Annotated[
         float | None,
         typer.Option(help="From the N face to the point (rod's length, 0), in mm."),
@@ -69,7 +65,7 @@ def navigate(
     out: Annotated[
         Path | None, typer.Option(help="Folder for tables, figure and film.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Push a rod through a lumen: planar, or a tube in space.
 

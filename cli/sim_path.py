@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import print_json, say
-from .sim_case import field_of, only_with, rod_of
+from .sim_case import Gmc, Json, SourceFile, SpecimenFile, field_of, only_with, rod_of
 
 if TYPE_CHECKING:
     from ..sim import Path as Followed
@@ -22,13 +22,9 @@ _HOW = "from:to[:back...]"
 
 def path(
     context: typer.Context,
-    gmc: Annotated[
-        int | None, typer.Option(help="Rod of the paper's Table 1, 1 to 7.")
-    ] = None,
-    specimen: Annotated[Path | None, typer.Option(help="Specimen file (TOML).")] = None,
-    magnet: Annotated[
-        Path | None, typer.Option(help="Magnet or source file (TOML).")
-    ] = None,
+    gmc: Gmc = None,
+    specimen: SpecimenFile = None,
+    magnet: SourceFile = None,
     field_mT: Annotated[
         str | None, typer.Option("--field-mT", help=f"Uniform flux, or {_HOW}.")
     ] = None,
@@ -65,7 +61,7 @@ def path(
     animation: Annotated[
         Path | None, typer.Option(help="Draw the shapes one by one: .gif.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Follow a rod quasi-statically through folds, snaps and back."""
     from ..core.files import output_file

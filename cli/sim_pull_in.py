@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .console import print_json, progress, say
-from .sim_case import field_of, rod_of
+from .sim_case import Gmc, Json, SpecimenFile, field_of, rod_of
 
 EXAMPLE = (
     "Example: magbend sim pull-in --gmc 2 --magnet M.toml "
@@ -25,10 +25,8 @@ def pull_in(
         ),
     ],
     magnet: Annotated[Path, typer.Option(help="Magnet or source file (TOML).")],
-    gmc: Annotated[
-        int | None, typer.Option(help="Rod of the paper's Table 1, 1 to 7.")
-    ] = None,
-    specimen: Annotated[Path | None, typer.Option(help="Specimen file (TOML).")] = None,
+    gmc: Gmc = None,
+    specimen: SpecimenFile = None,
     range_mm: Annotated[
         tuple[float, float], typer.Option(help="Smallest and largest gap to look at.")
     ] = (5.0, 200.0),
@@ -36,7 +34,7 @@ def pull_in(
     figure: Annotated[
         Path | None, typer.Option(help="Draw the map: .svg, .pdf, .png.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Find at which gap an approaching magnet pulls a rod in, over two properties."""
     from ..core.files import output_file, write_text

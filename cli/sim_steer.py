@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from .console import print_json, say
-from .sim_case import rod_of
+from .sim_case import Gmc, Json, SpecimenFile, rod_of
 from .sim_navigate import write_passage
 
 if TYPE_CHECKING:
@@ -26,10 +26,8 @@ EXAMPLE = (
 def steer(
     lumen: Annotated[Path, typer.Argument(help="Lumen file (TOML).")],
     gate: Annotated[str, typer.Option(help="Gate that the tip is to pass.")],
-    gmc: Annotated[
-        int | None, typer.Option(help="Rod of the paper's Table 1, 1 to 7.")
-    ] = None,
-    specimen: Annotated[Path | None, typer.Option(help="Specimen file (TOML).")] = None,
+    gmc: Gmc = None,
+    specimen: SpecimenFile = None,
     most_mT: Annotated[
         float | None,
         typer.Option("--most-mT", help="Uniform field: strongest, either way, in mT."),
@@ -64,7 +62,7 @@ def steer(
         Path | None,
         typer.Option(help="Folder for poses.toml, plan.toml, tables and film."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Find the field's path, pose by pose, that leads a rod through a gate.
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from .console import print_json, progress, say
-from .sim_case import only_with, rod_of
+from .sim_case import Json, only_with, rod_of
 
 EXAMPLE = "Example: magbend sim sweep field angle --gmc 2 --out studies"
 NAMES = ("field", "angle", "stiffness", "length", "side")
@@ -39,7 +39,7 @@ def sweep(
     out: Annotated[Path, typer.Option(help="Folder for figures and CSV.")] = Path(
         "sweep"
     ),
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: Json = False,
 ) -> None:
     """Vary one quantity at a time: a figure (SVG and PDF) and a CSV each."""
     names = list(dict.fromkeys(studies or NAMES))
