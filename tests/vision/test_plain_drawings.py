@@ -104,7 +104,7 @@ def test_a_rod_is_measured_without_the_shade_along_it(rod, deep):
 
 def test_a_rod_that_cannot_be_told_from_its_shade_is_refused():
     """Its edges were sought again on the outside of both: 7 px wider, without doubt."""
-    photo = drawn(rod=RED, turn_deg=40.0, shade_px=(4, 9), deep=0.66)
+    photo = drawn(rod=RED, turn_deg=25.0, shade_px=(4, 9), deep=0.7)
     found = extract(photo, SCALE, rod_height_mm=0.0)
     assert found.flags == ("edges_lost",)
 

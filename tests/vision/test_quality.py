@@ -14,6 +14,7 @@ from magbend.vision.curve.curve import Curve
 from magbend.vision.extraction.quality import _goes_on, doubts
 from magbend.vision.extraction.refine import refine
 from magbend.vision.extraction.setting import Setting
+from magbend.vision.extraction.strip import along_rod
 from magbend.vision.find.binarise import binarise
 from magbend.vision.find.ground import View
 from magbend.vision.find.rod import find_candidates
@@ -39,24 +40,27 @@ def measured(seed=0):
 
 def test_root_put_short_of_the_clamp_is_doubted():
     photo, _, refined = measured()
-    assert not _goes_on(photo, refined, 0.0)
+    view = View(grey=photo.grey, sign=1.0)
+    assert not _goes_on(along_rod(view, refined), refined, 0.0)
     whole = refined.fit.curve
     short = Curve(
         s=whole.s[60:] - whole.s[60], points=whole.points[60:],
         theta=whole.theta[60:], kappa=whole.kappa[60:],
     )  # fmt: skip
-    assert _goes_on(photo, replace(refined, fit=replace(refined.fit, curve=short)), 0.0)
+    refined = replace(refined, fit=replace(refined.fit, curve=short))
+    assert _goes_on(along_rod(view, refined), refined, 0.0)
 
 
 def test_direction_that_leaves_the_tip_unsure_is_doubted():
     photo, rod, refined = measured()
-    setting, view = Setting(), View(grey=photo.grey, sign=1.0)
+    strip = along_rod(View(grey=photo.grey, sign=1.0), refined)
+    setting = Setting()
 
     def flags(sd_deg):
         line = Measurement(
             status="ok", length_mm=30.0, width_px=20.0, clamp_angle_sd_deg=sd_deg
         )
-        return doubts(line, photo, view, refined, rod, setting).flags
+        return doubts(line, photo, strip, refined, rod, setting).flags
 
     assert "direction_doubtful" not in flags(0.2)  # 0.10 mm at the tip
     assert "direction_doubtful" in flags(0.3)  # 0.16 mm

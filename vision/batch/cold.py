@@ -26,7 +26,7 @@ from ..edge.step_line import _fit_line, _fit_step
 from ..extraction.extract import measure
 from ..extraction.setting import Setting
 from ..find.rod import _half_widths
-from ..find.track import _resample
+from ..find.track import resample
 from ..measurement import Pose
 from ..picture.photo import as_photo
 from ..synthetic.parts import Block, Scene, scene_camera
@@ -44,7 +44,7 @@ PATIENCE = 5_000_000
 
 _LATEST: tuple[Kernel, ...] = (
     _solution, _evidence, _model, penalised, _penalty, _measure_side, _sample,
-    _rough_edges, _fit_line, _fit_step, _half_widths, _resample,
+    _rough_edges, _fit_line, _fit_step, _half_widths, resample,
 )  # fmt: skip
 """Kernels of every part of a measurement, the slowest to compile among them."""
 

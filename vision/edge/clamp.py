@@ -196,10 +196,18 @@ def goes_on_at(grey: Image, curve: Curve, s: Array, width: float) -> bool:
     beside = 0.5 * width + 4.0
     across = np.array([-beside, -0.2 * width, 0.0, 0.2 * width, beside])
     before = lanes(grey, curve, np.linspace(1.0, 3.0, 9) * width, across)
+    return is_dark_line(before, lanes(grey, curve, s, across))
+
+
+def is_dark_line(before: Array, behind: Array) -> bool:
+    """Whether the dark between two lighter sides is seen behind as it is before.
+
+    Of each, shape (5, n), the first and the last lane lie beside the rod.
+    """
     rod, paper = median(before[1:4].ravel()), median(before[::4].ravel())
     if paper == rod:
         return False
-    light = np.array([median(lane) for lane in lanes(grey, curve, s, across)])
+    light = np.array([median(lane) for lane in behind])
     light = (light - rod) / (paper - rod)
     lighter = min(light[0], light[4]) - max(light[1:4].max(), 0.0)
     return bool(light[1:4].max() < 0.15 and lighter > 0.12)

@@ -84,7 +84,13 @@ def lanes(
     ndarray, shape (k, m)
         Light; NaN outside the picture.
     """
-    points, theta = curve.at(s)
+    return sample_lanes(grey, *curve.at(s), across, sign)
+
+
+def sample_lanes(
+    grey: Image, points: Array, theta: Array, across: Array, sign: float
+) -> Array:
+    """Sample lanes beside points, as `lanes` does, where the axis has given angles."""
     light = np.empty((len(across), len(points)))
     _sample_lanes(grey, points, theta, across, sign, light)
     return light

@@ -1,4 +1,7 @@
-"""Whether something else, as dark as the rod, crosses it or lies against it."""
+"""Whether the axis of a rod lies where it should: not under another thing, or on paper.
+
+Its edges are lost at such a place, and what is measured beyond may be another thing's.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..curve.robust import median
-from ..edge.step_line import lanes
-from ..find.ground import View
 from .refine import Refined
+from .strip import GRID, Strip
 
-_CLAMP, _ASIDE = 3.0, 0.9
+_CLAMP, _ASIDE = 3.0, 0.875
 """Nearer to the clamp its own sides may be beside the rod; and how far from the axis
 another thing is looked for, in widths: clear of an edge that is blurred, and nearer
 than the next turn of a coil."""
@@ -21,27 +23,46 @@ _DARK = 0.2
 _THICK, _LONG = 0.5, 5.0
 """Widths along the rod that a thing must hide: a thread is less, its shade is more."""
 
+_BARE, _RIM = 0.6, 0.375
+"""The same light, above which an axis lies on paper; and where the dark rims of a glint
+are looked for, which is lighter than paper in the middle, in widths from the axis."""
 
-def crossed_at(view: View, refined: Refined) -> float | None:
-    """Return the arc length in px where another thing meets the rod; None for none.
 
-    Its edges are lost there, and what is measured beyond may be the other thing's.
-    """
-    curve, width = refined.fit.curve, refined.typical_width
-    aside = _ASIDE * width
-    left, axis, right = lanes(
-        view.grey, curve, curve.s, np.array([-aside, 0.0, aside]), view.sign
-    )
-    rod = median(axis[refined.good])
-    paper = median(np.concatenate([left[refined.good], right[refined.good]]))
-    limit = rod + _DARK * (paper - rod)
-    step = float(curve.s[1] - curve.s[0])
+def crossed_at(strip: Strip, refined: Refined) -> float | None:
+    """Return the arc length in px where another thing meets the rod; None for none."""
+    left, right = strip.lanes(-_ASIDE, _ASIDE)
+    limit = _level(strip, refined, _DARK)
+    clear = (strip.s > _CLAMP * strip.width) & (strip.s <= refined.fit.curve.s[-1])
     for side in (left, right):
-        dark = (side < limit) & (curve.s > _CLAMP * width)
-        for first, after in _runs(dark):
-            if _THICK < (after - first) * step / width < _LONG:
-                return float(curve.s[(first + after) // 2])
+        for first, after in _runs((side < limit) & clear):
+            if _THICK < (after - first) / GRID < _LONG:
+                return float(strip.s[(first + after) // 2])
     return None
+
+
+def over_paper(strip: Strip, refined: Refined) -> float:
+    """Return how many widths the axis runs over paper at a stretch, without edges."""
+    if refined.good.all():
+        return 0.0
+    rims = strip.lanes(-_RIM, 0.0, _RIM).min(axis=0)
+    along = (strip.s >= 0.0) & (strip.s <= refined.fit.curve.s[-1])
+    bare = along & ~_edged(strip, refined) & (rims > _level(strip, refined, _BARE))
+    return max((float(after - first) / GRID for first, after in _runs(bare)), default=0)
+
+
+def _level(strip: Strip, refined: Refined, share: float) -> float:
+    """Return the light at a share of the way from the rod's to the paper's."""
+    edged = _edged(strip, refined)
+    left, axis, right = strip.lanes(-_ASIDE, 0.0, _ASIDE)[:, edged]
+    rod, paper = median(axis), median(np.concatenate([left, right]))
+    return rod + share * (paper - rod)
+
+
+def _edged(strip: Strip, refined: Refined) -> NDArray[np.bool_]:
+    """Return at which stations along the rod its edges were used."""
+    used = refined.good.astype(np.float64)
+    share = np.interp(strip.s, refined.fit.curve.s, used, left=0.0, right=0.0)
+    return np.asarray(share > 0.5)
 
 
 def _runs(dark: NDArray[np.bool_]) -> NDArray[np.intp]:

@@ -28,7 +28,8 @@ from .quality import OTHER_COLOUR, OTHER_ROD, TIP_GOES_ON, doubts, refusal
 from .refine import Refined, refine
 from .setting import Setting
 from .specimen_frame import measurement
-from .streak import whole_rod
+from .streak import find_streak, whole_rod
+from .strip import along_candidate, along_rod
 from .two_levels import rod_alone
 
 Array = NDArray[np.float64]
@@ -169,10 +170,16 @@ def measure_candidate(
     LostError
         If there is nothing to vouch for.
     """
-    view, candidate = whole_rod(view, candidate)
+    strip = along_candidate(view, candidate)
+    streak = find_streak(strip)
+    if streak is not None:
+        view, candidate = whole_rod(view, candidate, strip, streak)
+        strip = along_candidate(view, candidate)
+    elif candidate.halved:
+        candidate = replace(candidate, rivalled=True)
     grey, sign = view.grey, view.sign
     start = _start(grey, candidate, sign)
-    alone = None if start.rough else rod_alone(view, start, candidate)
+    alone = None if start.rough else rod_alone(strip, candidate, start.width)
     if alone is not None:
         candidate, start = alone, _start(grey, alone, sign)
     if start.rough:
@@ -216,12 +223,13 @@ def finish(
     refined = _refined(view, start, candidate, setting, sd_px)
     if np.isfinite(sd_px) and not refined.settled:
         raise LostError("edges_lost", "the rod moved too far since the last frame")
-    refusal(photo, view, refined, candidate)
+    strip = along_rod(view, refined)
+    refusal(photo, view, strip, refined, candidate)
     result = measurement(
         refined, view, setting, _told(photo, setting, refined.fit.curve)
     )
     result = replace(result, inverted=view.sign < 0.0, mix=view.mix)
-    return doubts(result, photo, view, refined, candidate, setting)
+    return doubts(result, photo, strip, refined, candidate, setting)
 
 
 def _refined(

@@ -8,24 +8,23 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..curve.robust import median, quantile
-from ..edge.clamp import goes_on_at
+from ..curve.robust import quantile
+from ..edge.clamp import is_dark_line
 from ..edge.edges import clear_of
 from ..edge.state import LostError
-from ..edge.step_line import lanes
 from ..edge.white import SOME
 from ..find.ground import View
 from ..find.rod import Candidate
 from ..find.rod_colour import ALIKE, distance_from
 from ..measurement import Measurement
 from ..picture.photo import Photo
-from .beyond_tip import goes_on_after_gap, tip_goes_on
-from .body_at_end import check_ends
-from .crossing import crossed_at
+from .beyond_ends import check_ends, goes_on_after_gap, tip_goes_on
+from .crossing import crossed_at, over_paper
 from .deviations import scale_sd
 from .refine import Refined
 from .root import HIDDEN_MM, root_hidden
 from .setting import Setting
+from .strip import Strip
 
 Array = NDArray[np.float64]
 
@@ -41,9 +40,9 @@ SCALE = 5e-4
 
 TIP_GOES_ON, OTHER_ROD, OTHER_COLOUR = "tip_goes_on", "other_rod", "colour_mismatch"
 
-OVER_PAPER, OVER_PAPER_ROUGH, BARE = 1.0, 3.0, 0.6
+OVER_PAPER, OVER_PAPER_ROUGH = 1.0, 3.0
 """Widths of bare paper under an axis that are more than a speck, or than a gap in a
-yarn; and its light."""
+yarn."""
 
 BLURRED_PX, BLURRED = 1.8, 0.08
 """Blur that is named: the lens is out of focus, or something moved; px and widths."""
@@ -57,7 +56,9 @@ edge then takes half the rod's width to rise. With less they may be, where a sha
 by so many widths, and the line is so much more blurred than the rod."""
 
 
-def refusal(photo: Photo, view: View, refined: Refined, candidate: Candidate) -> None:
+def refusal(
+    photo: Photo, view: View, strip: Strip, refined: Refined, candidate: Candidate
+) -> None:
     """Refuse a refined rod that contradicts what was found at first.
 
     Raises
@@ -81,13 +82,13 @@ def refusal(photo: Photo, view: View, refined: Refined, candidate: Candidate) ->
     if refined.fit.noise > 0.25 * width:
         raise LostError("inconsistent", "the edges of the rod lie on no smooth curve")
     bare = OVER_PAPER_ROUGH if refined.rough else OVER_PAPER
-    if _over_paper(view, refined) > bare * width:
+    if over_paper(strip, refined) > bare:
         raise LostError(
             "inconsistent",
             "the axis runs over bare paper for a while: two things may cross there",
         )
-    check_ends(photo, view, refined)
-    at = None if refined.rough else crossed_at(view, refined)
+    check_ends(photo, view, strip, refined)
+    at = None if refined.rough else crossed_at(strip, refined)
     if at is not None and not candidate.told:
         raise LostError(
             "touches_object",
@@ -98,26 +99,10 @@ def refusal(photo: Photo, view: View, refined: Refined, candidate: Candidate) ->
         raise LostError("no_rod", "what looks like a rod is shorter than five widths")
 
 
-def _over_paper(view: View, refined: Refined) -> float:
-    """Return how far the axis runs at a stretch over paper, without edges, px."""
-    if refined.good.all():
-        return 0.0
-    width, curve = refined.typical_width, refined.fit.curve
-    across = np.array([-0.5 * width - 4.0, -0.4 * width, 0.0, 0.4 * width])
-    beside, *inside = lanes(view.grey, curve, curve.s, across, view.sign)
-    rod, paper = median(inside[1][refined.good]), median(beside[refined.good])
-    # A glint is lighter than paper in the middle, but has dark rims.
-    darkest = np.min(inside, axis=0)
-    bare = ~refined.good & (darkest > rod + BARE * (paper - rod))
-    ends = np.flatnonzero(np.diff(np.concatenate([[False], bare, [False]])))
-    runs = ends[1::2] - ends[::2]
-    return float(runs.max(initial=0) * (curve.s[1] - curve.s[0]))
-
-
 def doubts(
     result: Measurement,
     photo: Photo,
-    view: View,
+    strip: Strip,
     refined: Refined,
     candidate: Candidate,
     setting: Setting,
@@ -134,10 +119,8 @@ def doubts(
         flags.append("clamp_at_border")
     if candidate.root == "free":
         flags.append("no_clamp")
-    after_gap = not refined.rough and goes_on_after_gap(
-        view, refined.fit.curve, result.width_px
-    )
-    crossed = candidate.told and crossed_at(view, refined) is not None
+    after_gap = not refined.rough and goes_on_after_gap(strip, refined)
+    crossed = candidate.told and crossed_at(strip, refined) is not None
     if candidate.rivalled or after_gap or crossed:
         flags.append(OTHER_ROD)
     # By a tag the place may be known all the same.
@@ -146,10 +129,10 @@ def doubts(
     pull = quantile(refined.shaded[refined.good], 0.9)
     face_px = setting.face_px(refined.fit.curve)
     if candidate.root == "clamp" and (
-        _front_in_shade(refined, pull) or _goes_on(photo, refined, face_px)
+        _front_in_shade(refined, pull) or _goes_on(strip, refined, face_px)
     ):
         flags.append("clamp_doubtful")
-    if not refined.rough and tip_goes_on(photo, view, refined):
+    if not refined.rough and tip_goes_on(photo, strip, refined):
         flags.append(TIP_GOES_ON)
     if direction_is_doubtful(result.clamp_angle_sd_deg, result.length_mm):
         flags.append("direction_doubtful")
@@ -220,14 +203,16 @@ def direction_is_doubtful(sd_deg: float, length_mm: float) -> bool:
     return bool(np.radians(sd_deg) * length_mm > TURN_MM)
 
 
-def _goes_on(photo: Photo, refined: Refined, face_px: float) -> bool:
+def _goes_on(strip: Strip, refined: Refined, face_px: float) -> bool:
     """Whether a dark line between two lighter sides goes on behind the clamp's line.
 
     Then that line may be the border of a shadow (or the clamp has an open groove).
     """
-    width, curve = refined.typical_width, refined.fit.curve
+    width, beside = strip.width, 0.5 + 4.0 / strip.width
     near = max(0.3 * width, 2.0 * clear_of(refined.blur) + face_px)
+    across = strip.lanes(-beside, -0.2, 0.0, 0.2, beside)
+    before = across[:, strip.between(width, 3.0 * width)]
     return any(
-        goes_on_at(photo.grey, curve, -np.linspace(first, last, 9), width)
+        is_dark_line(before, across[:, strip.between(-last, -first)])
         for first, last in ((near, near + 0.2 * width), (width, 1.6 * width))
     )

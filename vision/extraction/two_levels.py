@@ -15,15 +15,13 @@ from numpy.typing import NDArray
 
 from ..curve.robust import median
 from ..edge.edges import clear_of
-from ..edge.step_line import lanes
-from ..find.ground import View
 from ..find.rod import Candidate
-from ..find.track import Start
+from .strip import PARTS, Strip, profiles
 
 Array = NDArray[np.float64]
 
-_PARTS, _LEAST_PARTS = 10, 0.5
-"""Parts along the rod that are looked at; and the share of them that tell a step."""
+_LEAST_PARTS = 0.5
+"""Share of the parts along the rod that tell a step."""
 
 _STEP, _CLEAR = 0.08, 8.0
 """Least step inside a rod, over that from its darkest to the paper; and over the mean
@@ -35,67 +33,50 @@ _NARROW = 0.18
 _EDGE = 0.6
 """Light at the edge of both together, from the darkest to the paper."""
 
-_STATION_PX, _LANE_PX = 2.0, 0.5
 
-
-def rod_alone(view: View, start: Start, candidate: Candidate) -> Candidate | None:
+def rod_alone(strip: Strip, candidate: Candidate, width: float) -> Candidate | None:
     """Return the darker one of two bodies that lie along each other.
 
     Parameters
     ----------
-    view : View
-        The picture.
-    start : Start
+    strip : Strip
         The two as one.
     candidate : Candidate
         As it was found.
+    width : float
+        Width of both, px.
 
     Returns
     -------
     Candidate or None
-        None where what starts there has one level.
+        None where what lies there has one level.
     """
-    curve, clear = start.curve, clear_of(start.blur)
-    s = np.arange(0.0, curve.s[-1], _STATION_PX)
-    reach = 0.6 * start.width + 2.0 * clear
-    across = np.arange(-reach, reach, _LANE_PX)
-    light = lanes(view.grey, curve, s, across, view.sign)
-    if len(s) < 4 * _PARTS:
+    clear = clear_of(1.0)
+    across = strip.across * strip.width
+    near = np.abs(across) < 0.6 * width + 2.0 * clear
+    across, light = across[near], profiles(strip)[:, near]
+    dark, paper = light.min(axis=1), light.max(axis=1)
+    body = light < (dark + _EDGE * (paper - dark))[:, None]
+    low, high = across[body.argmax(axis=1)], across[-1 - body[:, ::-1].argmax(axis=1)]
+    inside = (across > low[:, None] + clear) & (across < high[:, None] - clear)
+    darkest = np.where(inside, light, np.inf).min(axis=1)
+    lightest = np.where(inside, light, -np.inf).max(axis=1)
+    varies = lightest - darkest > _STEP * (paper - dark)
+    closed = ~(body[:, 0] | body[:, -1])  # else a soft shade, no edge was taken for
+    middle = strip.s.reshape(PARTS, -1).mean(axis=1)
+    found = []
+    for k in np.flatnonzero(varies & closed):  # in nearly all rods nowhere
+        part = across[inside[k]], light[k, inside[k]]
+        step = _step(*part, paper[k], _NARROW * width, clear)
+        if step is not None:
+            place, rise = step
+            ends = (low[k], place) if rise > 0.0 else (place, high[k])
+            found.append((middle[k], *ends))
+    if len(found) < _LEAST_PARTS * PARTS:
         return None
-    at, low, high = [], [], []
-    for part in np.array_split(np.arange(len(s)), _PARTS):
-        profile = np.median(light[:, part], axis=1)
-        both = _levels(across, profile, _NARROW * start.width, clear)
-        if both is not None:
-            at.append(s[part].mean())
-            low.append(both[0])
-            high.append(both[1])
-    if len(at) < _LEAST_PARTS * _PARTS:
-        return None
-    middle = np.interp(s, at, 0.5 * (np.array(low) + np.array(high)))
-    points, theta = curve.at(s)
-    points = points + middle[:, None] * np.column_stack([-np.sin(theta), np.cos(theta)])
-    wide = median(np.array(high) - np.array(low))
-    return replace(candidate, points_px=points, width_px=wide)
-
-
-def _levels(
-    across: Array, profile: Array, narrow: float, clear: float
-) -> tuple[float, float] | None:
-    """Return where the darker of two levels begins and ends; None where one is seen."""
-    dark, paper = float(profile.min()), float(profile.max())
-    body = np.flatnonzero(profile < dark + _EDGE * (paper - dark))
-    if body[0] == 0 or body[-1] == len(profile) - 1:
-        return None  # a soft shade, that no edge was taken for
-    low, high = across[body[[0, -1]]]
-    inside = (across > low + clear) & (across < high - clear)
-    if not inside.any() or np.ptp(profile[inside]) < _STEP * (paper - dark):
-        return None  # as nearly all rods are: at no cost
-    step = _step(across[inside], profile[inside], paper, narrow, clear)
-    if step is None:
-        return None
-    place, rise = step
-    return (float(low), place) if rise > 0.0 else (place, float(high))
+    s, low, high = np.array(found).T
+    points = strip.beside(np.interp(strip.s, s, 0.5 * (low + high)))
+    return replace(candidate, points_px=points, width_px=median(high - low))
 
 
 def _step(
@@ -106,8 +87,9 @@ def _step(
     Each level is `narrow` at least; what lies within `clear` of the step is left out.
     """
     best, found = _CLEAR, None
-    least = max(int(narrow / _LANE_PX), 3)
-    gap = int(clear / _LANE_PX)
+    lane = float(across[1] - across[0])
+    least = max(int(narrow / lane), 3)
+    gap = int(clear / lane)
     for k in range(least, len(profile) - least + 1):
         left, right = (
             profile[: max(k - gap, least)],
@@ -118,5 +100,5 @@ def _step(
         step = levels[1] - levels[0]
         clearness = abs(step) / (float(rest) + 1e-4)
         if clearness > best and abs(step) > _STEP * (paper - min(levels)):
-            best, found = clearness, (float(across[k] - 0.5 * _LANE_PX), step)
+            best, found = clearness, (float(across[k] - 0.5 * lane), step)
     return found

@@ -90,7 +90,7 @@ def start_curve(
     Start or None
         None where no two edges are seen along most of the curve.
     """
-    s, along, theta = _resample(points, 0.6 * width)
+    s, along, theta = resample(points, 0.6 * width)
     normals = np.column_stack([-np.sin(theta), np.cos(theta)])
     low, high, dark, level = rough_edges(
         grey, along, normals, reach=0.5 * width + 4.0 + 2.0 * blur, sign=sign
@@ -137,7 +137,7 @@ def _is_rough(across: Array, width: float) -> bool:
 
 def smooth_curve(points: Array, *, spacing: float) -> Curve:
     """Fit a curve to a coarse polyline."""
-    s, even, theta = _resample(points, 0.25 * spacing)
+    s, even, theta = resample(points, 0.25 * spacing)
     fit = fit_curve(
         s, even, np.ones(len(s)), spacing=spacing, iterations=2, theta=theta,
         stiffness=0.1 * spacing**5, shared=SHARED / s[1],
@@ -146,7 +146,7 @@ def smooth_curve(points: Array, *, spacing: float) -> Curve:
 
 
 @njit(cache=True)
-def _resample(points: Array, window: float) -> tuple[Array, Array, Array]:
+def resample(points: Array, window: float) -> tuple[Array, Array, Array]:
     """Return arc length, points and smoothed tangent angles on an even grid."""
     kept, along = points.copy(), np.zeros(len(points))
     last = 0
