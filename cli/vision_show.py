@@ -69,6 +69,9 @@ _EXPLAINED = {
     "height_assumed": "nobody said how high the rod's axis lies above the board; 0 mm "
     "is taken: give --rod-height-mm (half the rod's side, and what lies under it), 0 "
     "if the board lay at its height",
+    "height_doubtful": "how far the camera is from the plane is hardly known, and the "
+    "scale at the rod's height with it: calibrate with --camera-height-mm (2 % is "
+    "enough) or with photographs of the tilted board",
     "camera_moved": "the tag on the clamp is seen in another size than when it was "
     "registered: the camera was moved or focused anew since; calibrate again",
     "clamp_turned": "the tag on the clamp lies in another direction than when it was "
@@ -87,8 +90,34 @@ _EXPLAINED = {
     "loose, the rod was clamped anew, or the clamp's line is that of a shade",
     "tag_not_seen": "the calibration knows a tag on the clamp, and it is not seen; "
     "the rod itself tells place and direction",
+    "clamp_at_border": "the rod is measured from the border of the picture, not from "
+    "its clamp: arc lengths begin there",
+    "clamp_lines_differ": "the lines at the clamp tell different places, or its front "
+    "is not square to the rod: look where the overlay begins, and light the clamp's "
+    "front evenly",
+    "clamp_doubtful": "a dark line goes on behind the point taken for the root, or the "
+    "clamp's front and its shade are seen as one: look where the overlay begins",
+    "direction_doubtful": "the direction at the clamp is so unsure that the tip may be "
+    "off by more than 0.15 mm: softer light there helps, and a tag on the clamp most "
+    "(vision board --clamp-tag)",
+    "root_hidden": "the clamp's top may hide the root: give --clamp-height-mm or "
+    "--length-mm",
+    "overexposed": "white along the rod hides where its edges are: expose less",
+    "rough_edges": "the edges scatter: hairs, or things that touch the rod; look at "
+    "the overlay",
+    "ragged_tip": "the end is no flat face: it is frayed, or something lies there; "
+    "look at the overlay",
+    "tip_goes_on": "something as wide as the rod, but paler, goes on beyond its tip: "
+    "its shade, or a part of it in another colour; look at the overlay",
+    "other_rod": "something else in the picture may be the rod, or the rest of it: "
+    "cover it, or say --specimen",
 }
 """Flags that a sentence helps with."""
+
+_BY_HAND = (
+    "A rod that is seen in a photograph that failed can be pointed at: magbend vision "
+    "points PHOTO --clamp X,Y --tip X,Y"
+)
 
 
 def _tell_clamps(frames: Sequence[FrameRow]) -> None:
@@ -165,6 +194,8 @@ def tell_frames(result: BatchResult, *, json_output: bool) -> None:
         if count:
             many = "s" if count > 1 else ""
             say(f"{flag} ({count} photograph{many}): {words}", err=True)
+    if result.measured < len(result.frames):
+        say(_BY_HAND, err=True)
     say(f"{result.out}: {result.measured} of {len(result.frames)} photographs measured")
 
 

@@ -4,8 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from magbend.cli.vision_show import tell_frames
 from magbend.vision import BatchResult, FrameRow
+
+DOUBTS = [
+    "direction_doubtful", "clamp_doubtful", "rough_edges", "ragged_tip", "overexposed",
+    "root_hidden", "clamp_at_border", "height_doubtful", "tip_goes_on",
+    "clamp_lines_differ", "other_rod", "width_mismatch", "colour_mismatch",
+]  # fmt: skip
 
 
 def told(frames, capsys):
@@ -19,9 +27,22 @@ def test_frames_in_a_row_with_one_doubt_are_told_in_one_line(capsys):
         for k in range(8)
     ]
     frames += [FrameRow(image="film_000008", status="failed", reason="no rod")]
-    assert told(frames, capsys) == [
+    assert told(frames, capsys)[:-1] == [
         "film_000000 to film_000004 (5): shadow",
         "film_000006: shadow",
         "film_000007: shadow",
         "film_000008: failed: no rod",
     ]
+
+
+def test_a_refusal_names_the_way_to_measure_it_all_the_same(capsys):
+    lost = FrameRow(image="a", status="failed", reason="no rod")
+    assert "magbend vision points" in told([lost], capsys)[-1]
+    assert not told([FrameRow(image="a", status="ok")], capsys)
+
+
+@pytest.mark.parametrize("flag", DOUBTS)
+def test_every_doubt_is_explained_on_the_terminal(flag, capsys):
+    first, *rest = told([FrameRow(image="a", status="ok", flags=(flag,))], capsys)
+    assert first == f"a: {flag}"
+    assert rest[0].startswith(f"{flag} (1 photograph): ")

@@ -55,7 +55,9 @@ def find_ends(
         if tip is not None:
             break
     if tip is None:
-        raise LostError("no_tip", "the free end of the rod has no edge")
+        raise LostError(
+            "no_tip", "the free end of the rod shows no edge: lay plain paper there"
+        )
     state.tip_blur = tip.blur
     if walls is not None and turn >= _FINE:
         tip = _to_end_of_face(tip, state, seen, walls)
@@ -146,7 +148,9 @@ def _first(lines: ClampLines, face_px: float) -> float:
     """Return the arc length where the rod begins, as it is seen."""
     line = lines.face or lines.front
     if line is None:
-        raise LostError("no_clamp", "it is not seen where the rod leaves the clamp")
+        raise LostError(
+            "no_clamp", "it is not seen where the rod leaves the clamp: light its front"
+        )
     if lines.front is None:
         return line.s
     apart = lines.front.s - line.s

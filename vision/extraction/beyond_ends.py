@@ -93,7 +93,8 @@ def check_ends(photo: Photo, view: View, strip: Strip, refined: Refined) -> None
         )
     if _tip_at_body(strip, refined):
         raise LostError(
-            "touches_object", "the rod touches another object besides its root"
+            "touches_object",
+            "something as dark as the rod lies at its tip: take it away",
         )
 
 

@@ -257,7 +257,8 @@ def _refined(
     if refined.typical_width < least:
         raise LostError(
             "edges_lost",
-            "the rod's two edges run into each other in the blur: focus the lens",
+            "the rod's two edges are seen closer together than it is wide: focus the "
+            "lens, or soften the light on a glossy rod",
         )
     return refined
 

@@ -71,13 +71,14 @@ def refusal(
     if not 0.8 < length / candidate.length_px < 1.5 + 8.0 * width / length:
         raise LostError(
             "inconsistent",
-            f"the measured axis is {length:.0f} px long, but the dark thing it belongs "
+            f"the measured axis is {length:.0f} px long, but the thing it belongs "
             f"to {candidate.length_px:.0f} px",
         )
     if refined.good.mean() < 0.5:
         raise LostError(
             "edges_lost",
-            f"only {100 * refined.good.mean():.0f} % of the rod has two clear edges",
+            f"only {100 * refined.good.mean():.0f} % of the rod has two clear edges: "
+            "lay it on plain paper of another colour, in softer light",
         )
     if refined.fit.noise > 0.25 * width:
         raise LostError("inconsistent", "the edges of the rod lie on no smooth curve")

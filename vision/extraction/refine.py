@@ -223,7 +223,8 @@ def _look(grey: Image, state: State, sign: float, turn: int, *, seeking: bool) -
     if good.sum() < max(8.0, 0.4 * len(good)):
         raise LostError(
             "edges_lost",
-            "less than half of the rod has two edges that can be told from the paper",
+            "less than half of the rod has two edges that can be told from the paper: "
+            "lay it on plain paper of another colour",
         )
     state.width = median(edges.width[good])
     blur = edges.blur

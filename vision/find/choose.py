@@ -21,8 +21,9 @@ Array = NDArray[np.float64]
 Clamp = Literal["auto", "none"]
 
 _NO_CLAMP = (
-    "the rod grows from no clamp and from no border of the picture; "
-    "for a rod that floats freely say --free (from Python: clamp='none')"
+    "no clamp is seen at either end of the rod, nor a border of the picture: give the "
+    "clamp another colour than the ground; for a rod that floats freely say --free "
+    "(from Python: clamp='none')"
 )
 _SIZE = 1.6
 """Factor by which a thing may be larger or smaller than the rod that is sought."""
@@ -217,13 +218,13 @@ def _too_many(rods: list[Candidate], seen: list[Array]) -> LostError:
             "two_rods",
             "there are two things like a rod in the picture, "
             f"{rods[0].length_px:.0f} and {rods[1].length_px:.0f} px long; cover one "
-            "of them",
+            "of them, or say --specimen",
             seen,
         )
     return LostError(
         "no_rod",
         f"there are {len(rods)} long and thin things in the picture and none that "
-        "stands out as the rod",
+        "stands out as the rod; cover the others, or say --specimen",
         seen,
     )
 
@@ -325,8 +326,14 @@ def _alike(first: Candidate, rods: list[Candidate]) -> list[Candidate]:
 def _accept(rod: Candidate) -> Candidate:
     if rod.contacts > 1:
         if rod.leaves:
-            raise LostError("touches_border", "the rod leaves the picture")
+            raise LostError(
+                "touches_border",
+                "the rod, or what it runs into, meets the picture's border besides its "
+                "root: take the whole rod into the picture, and cover what else runs "
+                "to the border",
+            )
         raise LostError(
-            "touches_object", "the rod touches another object besides its root"
+            "touches_object",
+            "the rod touches another object besides its root: take that away",
         )
     return rod
