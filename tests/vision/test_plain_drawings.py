@@ -8,6 +8,7 @@ import pytest
 
 from magbend.vision import as_photo, extract
 from magbend.vision.camera.calibrate import calibrate_known_length
+from magbend.vision.synthetic import signed_distance
 
 SIZE, FINE, WIDTH = (800, 500), 2, 20.0
 BLACK, RED, GREEN = (0.025,) * 3, (0.05, 0.04, 0.45), (0.06, 0.25, 0.05)
@@ -165,14 +166,30 @@ def test_a_wire_that_crosses_a_rod_does_not_grow_from_it():
     assert not extract(photo, SCALE, rod_height_mm=0.0).ok
 
 
-@pytest.mark.parametrize("at", [0.0, 0.1, -0.22])
-def test_a_streak_of_gloss_all_along_leaves_one_rod(at):
-    gloss = ((0.65,) * 3, strip(50.0, at - 0.1, at + 0.1))
-    found = measured(rod=BLACK, turn_deg=50.0, over=[gloss])
-    truth, _ = axis(50.0)
-    away = [np.hypot(*(truth - point).T).min() for point in found.points_px[:-1]]
-    assert max(away) < 1.0
-    assert found.width_px == pytest.approx(WIDTH, rel=0.06)
+@pytest.mark.parametrize(
+    ("light", "low", "high"),
+    [(0.65, 0.0, 0.2), (0.9, -0.1, 0.1), (0.65, 0.25, 0.44), (1.2, -0.42, -0.2)],
+)
+def test_a_streak_of_gloss_all_along_moves_no_edge(light, low, high):
+    matt = measured(rod=BLACK, turn_deg=50.0)
+    over = [((light,) * 3, strip(50.0, low, high))]
+    glossy = extract(
+        drawn(rod=BLACK, turn_deg=50.0, over=over), SCALE, rod_height_mm=0.0
+    )
+    assert glossy.ok, glossy.reason
+    assert not {"other_rod", "rough_edges", "ragged_tip"} & set(glossy.flags)
+    assert glossy.width_px == pytest.approx(matt.width_px, abs=0.15)
+    assert glossy.length_px == pytest.approx(matt.length_px, abs=0.25)
+    aside = signed_distance(glossy.points_px[1:-1], matt.points_px)
+    assert np.abs(aside).max() < 0.2
+
+
+def test_two_rods_side_by_side_are_doubted():
+    shared = np.array([0.0, 1.4 * WIDTH])
+    second = strip(0.0, -0.5, 0.5) + shared
+    photo = drawn(rod=BLACK, turn_deg=0.0, over=[(BLACK, second)])
+    found = extract(photo, SCALE, rod_height_mm=0.0)
+    assert not found.ok or "other_rod" in found.flags
 
 
 def test_of_two_rods_in_a_clamp_the_known_length_tells_which():

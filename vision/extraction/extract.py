@@ -28,7 +28,7 @@ from .quality import OTHER_COLOUR, OTHER_ROD, TIP_GOES_ON, doubts, refusal
 from .refine import Refined, refine
 from .setting import Setting
 from .specimen_frame import measurement
-from .streak import find_streak, whole_rod
+from .streak import is_parted, whole_rod
 from .strip import along_candidate, along_rod
 from .two_levels import rod_alone
 
@@ -171,9 +171,8 @@ def measure_candidate(
         If there is nothing to vouch for.
     """
     strip = along_candidate(view, candidate)
-    streak = find_streak(strip)
-    if streak is not None:
-        view, candidate = whole_rod(view, candidate, strip, streak)
+    if is_parted(strip):
+        view, candidate = whole_rod(view, candidate)
         strip = along_candidate(view, candidate)
     elif candidate.halved:
         candidate = replace(candidate, rivalled=True)

@@ -1,212 +1,257 @@
 """A rod that a streak of gloss parts along its length, and which was found in part.
 
 A smooth rod mirrors the lamp in a line as long as itself, and may be as light there as
-the paper. What is left and right of the line is dark, narrow, and parallel all along,
-which two rods are not unless they are alike and bent alike.
+the paper. What is left and right of the line is dark and parallel all along, and the
+width of both with the line between is the same everywhere. The light that the lamp adds
+is fitted and taken off the picture: the rod is then seen as if it were matt.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..curve.curve import Curve
 from ..curve.robust import median, quantile
+from ..edge.flank import median_profiles
+from ..edge.highlight import fit_bars
+from ..edge.step_line import lanes
 from ..find.ground import View
 from ..find.rod import Candidate
-from ..find.track import smooth_curve
-from .strip import PARTS, Strip, profiles
+from ..find.track import smooth_curve, start_curve
+from .matt import Streak, matt
+from .strip import Strip, profiles
 
 Array = NDArray[np.float64]
-Image = NDArray[np.float32]
 
-_MOST_PARTS = 0.7
-"""Share of the parts along the rod that see a streak."""
+_PARTS, _MOST_PARTS = 16, 0.6
+"""Parts along the rod that are looked at; and the share of them that see a streak."""
 
-_GAP = 0.8
-"""Widest streak, over the wider of what lies beside it."""
+_LOOKS, _LONGER_PX = 3, 1.0
+"""So often a streak is looked at, along an axis that is known better each time, while
+that becomes longer."""
 
-_AS_DARK, _AS_DARK_RIM, _STEADY = 0.12, 0.4, 0.12
-"""How far the light of both may differ, over that from dark to paper, and where one is
-so narrow that blur makes it paler; and how much the outer edges may wander along the
-rod, in widths of the whole."""
+_DEEP, _AS_DARK, _UNRESOLVED, _THIN_PX = 0.12, 0.12, 0.75, 5.0
+"""How much darker than what is beside it a part must be, of the light from dark to
+paper; by how much the light of both may differ, and where one is so thin that it is not
+as dark as it is."""
 
-_RIM, _NARROW = 0.4, 0.6
-"""Widths of the second part, over that of the first: of a rim, and above which it may
-be a rod."""
+_GAP, _STEADY, _SHADED = 1.0, 0.25, 1.15
+"""Widest streak, over the wider of what lies beside it; how much its width may wander;
+and the width of the whole, over that where it is least, that a shade makes."""
 
-_LIGHTER, _FLANK = 0.3, 0.6
-"""A streak is lighter than what lies beside it by this share of its own light, and that
-is darker than this share."""
+_LEAST_REACH_PX, _SLENDER = 40.0, 8.0
+"""What is found may be a thin rim of a wide rod: how far across that is looked for, but
+in a length of the rod so many times at most."""
 
-_PAD = 4
-"""Lanes beside a streak into which its blur reaches."""
+_PAPER_PX, _BLUR_PX = 8.0, 1.2
+_LANE_PX, _STATION_PX = 0.5, 3.0
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Streak:
-    """A streak of gloss along a strip, and the dark to either side of it.
-
-    Parameters
-    ----------
-    s : ndarray, shape (n,)
-        Arc lengths of the parts in which it is seen, px.
-    edges : ndarray, shape (4, n)
-        Offsets from the strip's axis, px: low edge of the rod, both edges of the
-        streak, in which its blur lies, and high edge.
-    likeness : float
-        Width of the narrower dark part over that of the wider one.
-    dark : float
-        Light of the rod.
-    """
-
-    s: Array
-    edges: Array
-    likeness: float
-    dark: float
+_TWIN, _BRIGHT, _TURN = 0.6, 1.08, 0.5
+"""Two rods side by side: of like width; the gap between them is hardly lighter than
+paper; and where they are bent, by radians, their ends are not flush."""
 
 
-def find_streak(strip: Strip) -> Streak | None:
-    """Return the streak of gloss that parts a rod all along; None where there is none.
+class _Look(NamedTuple):
+    """Profiles across a curve: medians of parts at arc lengths `at`, (parts, m)."""
+
+    curve: Curve
+    at: Array
+    across: Array
+    profiles: Array
+
+
+def is_parted(strip: Strip) -> bool:
+    """Whether most profiles have dark beyond something light, as seen from the axis.
+
+    A quick question, to which nearly all rods say no.
 
     Parameters
     ----------
     strip : Strip
         Along a rod, or along the part of one on one side of a streak.
     """
-    across = strip.across * strip.width
     light = profiles(strip)
-    darkest = np.fmin.reduce(light, axis=1)
-    paper = np.array([quantile(profile, 0.9) for profile in light])
-    below = np.zeros((PARTS, len(across) + 2), np.bool_)
-    below[:, 1:-1] = light < 0.5 * (darkest + paper)[:, None]
-    parted = np.flatnonzero((below[:, 1:] & ~below[:, :-1]).sum(axis=1) > 1)
-    if len(parted) < _MOST_PARTS * PARTS:
-        return None  # as nearly all rods are: at no cost
-    middle = strip.s.reshape(PARTS, -1).mean(axis=1)
-    found = []
-    for k in parted:
-        runs = np.flatnonzero(below[k, 1:] != below[k, :-1]).reshape(-1, 2)
-        both = _both_sides(across, light[k], runs, paper[k] - darkest[k])
-        if both is not None:
-            found.append((middle[k], *both, darkest[k]))
-    if len(found) < _MOST_PARTS * PARTS:
-        return None
-    s, *edges, likeness, dark = np.array(found).T
-    wide = median(edges[3] - edges[0])
-    if max(np.std(edges[0]), np.std(edges[3])) >= _STEADY * wide:
-        return None
-    return Streak(
-        s=s, edges=np.array(edges), likeness=median(likeness), dark=median(dark)
-    )
+    seen = ~np.isnan(light)
+    low, high = np.where(seen, light, np.inf), np.where(seen, light, -np.inf)
+    span = high.max(axis=1) - low.min(axis=1)
+    middle = int(np.searchsorted(strip.across, 0.0))
+    for side in (slice(middle, None, -1), slice(middle, None)):
+        lightest = np.maximum.accumulate(high[:, side], axis=1)
+        falls = np.max(lightest - low[:, side], axis=1) > _DEEP * span
+        if np.mean(falls) >= _MOST_PARTS:
+            return True
+    return False
 
 
-def whole_rod(
-    view: View, candidate: Candidate, strip: Strip, streak: Streak
-) -> tuple[View, Candidate]:
-    """Return a rod with all that a streak of gloss parted from it, the streak painted.
+def whole_rod(view: View, candidate: Candidate) -> tuple[View, Candidate]:
+    """Return a rod with all that a streak of gloss parted from it, without the streak.
 
     Parameters
     ----------
-    view, candidate : View, Candidate
-        The picture, and a rod, or the part of one on one side of a streak.
-    strip, streak : Strip, Streak
-        The strip along the candidate, and the streak in it.
+    view : View
+        The picture.
+    candidate : Candidate
+        A rod, or the part of one on one side of a streak.
 
     Returns
     -------
     View
-        The picture in which the streak is as dark as the rod.
+        The picture without the light of the streak.
     Candidate
-        `rivalled` where the part beyond the streak is so wide that it may be another
-        rod.
+        `rivalled` where what lies beyond the streak may be another rod. Both are the
+        same where there is no streak.
+
     """
-    low, _, _, high = streak.edges
-    middle = 0.5 * (low + high)
-    whole = replace(
-        candidate, points_px=strip.beside(np.interp(strip.s, streak.s, middle)),
-        width_px=median(high - low),
-        rivalled=candidate.rivalled or streak.likeness > _NARROW,
-    )  # fmt: skip
-    aside = replace(streak, edges=streak.edges - middle)
-    return replace(view, grey=_painted(view, whole, strip.s[-1], aside)), whole
-
-
-def _painted(view: View, whole: Candidate, length: float, streak: Streak) -> Image:
-    """Return a picture in which a streak is as dark as its rod, from end to end.
-
-    `length` is that of the strip in which the streak was found: the rod may be longer,
-    and the streak is where it lies between dark parts.
-    """
-    width, room = whole.width_px, 3.0 * whole.width_px
-    curve = smooth_curve(whole.points_px, spacing=max(2.0 * width, 16.0))
-    s = np.arange(-room, curve.s[-1] + room)
-    points, theta = curve.at(s)
-    normals = np.column_stack([-np.sin(theta), np.cos(theta)])
-    at = streak.s * (curve.s[-1] / length)
-    low, first, last, high = (np.interp(s, at, edge) for edge in streak.edges)
-
-    def light(offset: Array) -> Array:
-        x, y = np.rint(points + offset[:, None] * normals).astype(int).T
-        height, width = view.grey.shape
-        seen = view.grey[y.clip(0, height - 1), x.clip(0, width - 1)]
-        return np.asarray(view.sign * seen, np.float64)
-
-    beside = np.maximum(light(0.5 * (low + first)), light(0.5 * (last + high)))
-    inside = light(0.5 * (first + last))
-    dark, span = streak.dark, median(inside) - streak.dark
-    on = (inside - beside > _LIGHTER * span) & (beside - dark < _FLANK * span)
-    grey = view.grey.copy()
-    ends = np.flatnonzero(np.diff(on.astype(np.int8), prepend=0, append=0))
-    for begin, end in ends.reshape(-1, 2):
-        left, right = (
-            (points + offset[:, None] * normals)[begin:end] for offset in (first, last)
-        )
-        corners = np.round(np.vstack([left, right[::-1]]) * 16.0).astype(np.int32)
-        cv2.fillPoly(grey, [corners.reshape(-1, 1, 2)], view.sign * dark, shift=4)
-    return grey
-
-
-def _both_sides(
-    across: Array, profile: Array, runs: NDArray[np.intp], span: float
-) -> tuple[float, ...] | None:
-    """Return low edge, streak, high edge, and likeness of two dark runs of a profile.
-
-    Of the streak both edges, in which its blur lies; likeness is the narrower part's
-    width over the wider one's. None where there are not two such parts.
-    """
-    middle = int(np.searchsorted(across, 0.0))
-    away = np.maximum(runs[:, 0] - middle, middle - runs[:, 1])
-    nearest = int(np.argmin(away))
-    found = None
-    for low in (nearest - 1, nearest):
-        if (
-            low < 0
-            or low + 1 >= len(runs)
-            or not _one_rod(runs[low : low + 2], profile, span)
-        ):
-            continue
-        if found is not None:
-            return None  # dark on both sides of what is dark: lines, no streak
-        (first, last), (begin, end) = runs[low], runs[low + 1]
-        sizes = sorted([last - first, end - begin])
-        pads = [min(_PAD, size - _PAD) for size in (last - first, end - begin)]
-        inner = max(last - max(pads[0], 0), first), min(begin + max(pads[1], 0), end)
-        found = (
-            float(across[first]), float(across[inner[0]]),
-            float(across[inner[1] - 1]), float(across[end - 1]),
-            sizes[0] / sizes[1],
+    one = replace(candidate, rivalled=candidate.rivalled or candidate.halved)
+    if view.sign < 0.0:
+        return view, one  # gloss makes a light rod lighter
+    found, along, length = (view, one), candidate.points_px, 0.0
+    for _ in range(_LOOKS):
+        look = _look(view, along, candidate.width_px)
+        streak = _streak(look)
+        if streak is None:
+            break
+        whole = replace(
+            candidate, points_px=streak.axis(), width_px=streak.width,
+            rivalled=candidate.rivalled or _is_doubtful(streak),
         )  # fmt: skip
+        found = matt(view, streak), whole
+        start = start_curve(
+            found[0].grey, whole.points_px, whole.width_px, sign=view.sign,
+            follow=candidate.root == "clamp",
+        )  # fmt: skip
+        if start is None or start.curve.s[-1] < length + _LONGER_PX:
+            break
+        along, length = start.curve.points, float(start.curve.s[-1])
     return found
 
 
-def _one_rod(runs: NDArray[np.intp], profile: Array, span: float) -> bool:
-    """Whether two runs of dark are what a streak of gloss leaves of a rod."""
-    (first, last), (begin, end) = runs
-    narrow, wide = sorted([last - first, end - begin])
-    levels = abs(profile[first:last].min() - profile[begin:end].min())
-    differ = _AS_DARK_RIM if narrow < _RIM * wide else _AS_DARK
-    inside = first > 0 and end < len(profile)
-    return bool(inside and levels < differ * span and begin - last < _GAP * wide)
+def _look(view: View, along: Array, width: float) -> _Look:
+    """Return profiles across a polyline, as far out as the whole rod may reach."""
+    curve = smooth_curve(along, spacing=max(2.0 * width, 16.0))
+    s = np.arange(0.0, curve.s[-1], _STATION_PX)
+    least = min(curve.s[-1] / _SLENDER, _LEAST_REACH_PX)
+    reach = max(2.5 * width + 6.0, least)
+    across = np.arange(-reach, reach, _LANE_PX)
+    light = lanes(view.grey, curve, s, across, view.sign)
+    bounds = np.linspace(0, len(s), min(_PARTS, len(s)) + 1).astype(np.int64)
+    middle = 0.5 * (s[bounds[:-1]] + s[bounds[1:] - 1])
+    return _Look(curve, middle, across, median_profiles(light.T, bounds))
+
+
+def _streak(look: _Look) -> Streak | None:
+    """Return the streak that most parts of a rod show."""
+    sides = [_both_sides(look.across, profile) for profile in look.profiles]
+    rows = np.array([k for k, both in enumerate(sides) if both is not None], np.intp)
+    if len(rows) < _MOST_PARTS * _PARTS:
+        return None
+    near = np.array([both for both in sides if both is not None])
+    gap = near[:, 2] - near[:, 1]
+    alike = np.abs(gap - median(gap)) < _STEADY * median(gap) + 1.0
+    rows, near = rows[alike], _narrowed(near[alike])
+    wide = near[:, 3] - near[:, 0]
+    steady = np.abs(wide - median(wide)) < _STEADY * median(wide)
+    if np.count_nonzero(steady) < _MOST_PARTS * _PARTS:
+        return None
+    rows, near = rows[steady], near[steady]
+    profiles, x = look.profiles[rows], look.across
+    beyond = (x < near[:, :1] - _PAPER_PX) | (x > near[:, 3:] + _PAPER_PX)
+    bars = fit_bars(x, np.where(beyond, np.nan, profiles), near, blur=_BLUR_PX)
+    fitted = _narrowed(np.column_stack([bars.low, bars.first, bars.last, bars.high]))
+    bars = bars._replace(low=fitted[:, 0], high=fitted[:, 3])
+    return Streak(curve=look.curve, at=look.at[rows], bars=bars)
+
+
+def _narrowed(edges: Array) -> Array:
+    """Return low, first, last, high without the shade beside some parts of a rod."""
+    low, first, last, high = edges.T
+    wide = high - low
+    width = quantile(wide, 0.25)
+    shaded, below = wide > _SHADED * width, first - low > high - last
+    low = np.where(shaded & below, high - width, low)
+    high = np.where(shaded & ~below, low + width, high)
+    return np.column_stack([low, first, last, high])
+
+
+def _both_sides(across: Array, profile: Array) -> tuple[float, ...] | None:
+    """Return low edge, both edges of the streak, and high edge of a parted rod.
+
+    None where there are not two dark parts, or more than two that fit each other.
+    """
+    seen = np.isfinite(profile)
+    if not seen.any():
+        return None
+    x, light = across[seen], profile[seen]
+    least = _DEEP * float(np.ptp(light))
+    turns, found = _turns(light, least), None
+    for k in range(0, len(turns) - 4, 2):
+        both = _parted(x, light, turns[k : k + 5])
+        if both is not None and found is not None:
+            return None  # dark on both sides of what is dark: lines, no streak
+        found = found or both
+    return found
+
+
+def _turns(light: Array, least: float) -> list[int]:
+    """Return where a profile is lightest and darkest in turn, by `least` and more.
+
+    It begins and ends with a lightest place.
+    """
+    turns, lightest, darkest, rises = [], 0, 0, True
+    for k, value in enumerate(light):
+        if rises and value > light[lightest]:
+            lightest = k
+        elif rises and value < light[lightest] - least:
+            turns.append(lightest)
+            darkest, rises = k, False
+        elif not rises and value < light[darkest]:
+            darkest = k
+        elif not rises and value > light[darkest] + least:
+            turns.append(darkest)
+            lightest, rises = k, True
+    return [*turns, lightest] if rises else turns
+
+
+def _parted(x: Array, light: Array, turns: list[int]) -> tuple[float, ...] | None:
+    """Return the edges of two dark parts of one rod near 0; None if they are none.
+
+    `turns` are paper, dark, streak, dark, paper. The wider part tells how dark it is.
+    """
+    left, one, streak, two, right = turns
+
+    def crossing(dark: int, to: int) -> float:
+        level, step = 0.5 * (light[dark] + light[to]), 1 if to > dark else -1
+        k = dark
+        while light[k] < level:
+            k += step
+        share = (level - light[k - step]) / (light[k] - light[k - step])
+        return float(x[k - step] + share * (x[k] - x[k - step]))
+
+    low, first = crossing(one, left), crossing(one, streak)
+    last, high = crossing(two, streak), crossing(two, right)
+    ends = sorted([(first - low, light[one]), (high - last, light[two])])
+    (narrow, other), (wide, dark) = ends
+    span = max(light[left], light[right]) - dark
+    paler = _UNRESOLVED if narrow < _THIN_PX else _AS_DARK
+    alike = -_AS_DARK * span < other - dark < paler * span
+    here = low - 2.0 < 0.0 < high + 2.0
+    if not (alike and here and last - first < _GAP * wide):
+        return None
+    return low, first, last, high
+
+
+def _is_doubtful(streak: Streak) -> bool:
+    """Whether what lies beyond a streak may be another rod, or a line beside this one.
+
+    A line is all that can be told of what is thinner than the picture's blur.
+    """
+    bars = streak.bars
+    thin, wide = sorted(streak.rims)
+    paper = median(np.maximum(bars.left, bars.right))
+    turn = abs(streak.curve.theta[-1] - streak.curve.theta[0])
+    gap = median(bars.dark + bars.light) < _BRIGHT * paper and turn < _TURN
+    return bool(thin < median(np.exp(bars.blur)) or (gap and thin > _TWIN * wide))
