@@ -12,6 +12,7 @@ from magbend.vision.synthetic import signed_distance
 
 SIZE, FINE, WIDTH = (800, 500), 2, 20.0
 BLACK, RED, GREEN = (0.025,) * 3, (0.05, 0.04, 0.45), (0.06, 0.25, 0.05)
+TAN = (0.26, 0.43, 0.58)
 ROOT = np.array([200.0, 240.0])
 CLAMP = ROOT + np.array([[0, 90], [0, -90], [-110, -90], [-110, 90]])
 SCALE = calibrate_known_length(
@@ -103,26 +104,24 @@ def test_a_rod_is_measured_without_the_shade_along_it(rod, deep):
     assert max(away) < 1.0
 
 
-def test_a_rod_that_cannot_be_told_from_its_shade_is_refused():
-    """Its edges were sought again on the outside of both: 7 px wider, without doubt."""
-    photo = drawn(rod=RED, turn_deg=25.0, shade_px=(4, 9), deep=0.7)
-    found = extract(photo, SCALE, rod_height_mm=0.0)
-    assert found.flags == ("edges_lost",)
+@pytest.mark.parametrize("rod", [RED, TAN])
+def test_a_colour_tells_a_rod_from_a_shade_that_is_as_dark_or_darker(rod):
+    found = measured(rod=rod, turn_deg=40.0, shade_px=(4, 9), deep=0.66)
+    assert not {"direction_doubtful", "clamp_doubtful"} & set(found.flags)
+    assert found.width_px == pytest.approx(WIDTH, rel=0.03)
+    assert np.hypot(*(found.tip_px - axis(40.0)[0][-1])) < 0.5
+    assert found.length_mm == pytest.approx(20.0, abs=0.06)
+
+
+def test_it_tells_a_clamps_front_from_a_shade_that_blur_makes_one_with_it():
+    found = measured(rod=RED, turn_deg=9.0, shade_px=(4, 12), deep=0.5, blur_px=3.2)
+    assert abs(found.clamp_px[0] - ROOT[0]) < 1.5
+    assert found.length_mm == pytest.approx(20.0, abs=0.06)
 
 
 @pytest.mark.parametrize("deep", [0.0, 0.5])
-@pytest.mark.parametrize(
-    ("rod", "turn_deg", "shade_px", "blur_px"),
-    [(BLACK, 30.0, (6, 14), 5.0), (RED, 9.0, (4, 12), 3.2)],
-)
-def test_a_front_that_is_blurred_into_its_shade_is_in_doubt(
-    rod, turn_deg, shade_px, blur_px, deep
-):
-    photo = drawn(
-        rod=rod, turn_deg=turn_deg, shade_px=shade_px, deep=deep, blur_px=blur_px
-    )
-    found = extract(photo, SCALE, rod_height_mm=0.0)
-    assert found.ok, found.reason
+def test_a_front_that_is_blurred_into_its_shade_is_in_doubt(deep):
+    found = measured(rod=BLACK, turn_deg=30.0, shade_px=(6, 14), deep=deep, blur_px=5.0)
     assert ("clamp_doubtful" in found.flags) == (deep > 0.0)
     assert (abs(found.clamp_px[0] - ROOT[0]) < 1.5) == (deep == 0.0)
 

@@ -66,6 +66,8 @@ def find_ends(
     if root == "free":
         return tip, None, _other_end(grey, state, sign, outwards, reach)
     lines = _clamp_lines(grey, state, seen, sign, turn)
+    if state.plain is not None:
+        lines = _with_front(lines, state.plain, state, seen, turn)
     state.clamp_blur = lines.blur
     return tip, lines, _first(lines, state.face_px)
 
@@ -100,6 +102,25 @@ def _clamp_lines(
     outer -= clear_of(state.blur) + _LAG_PX
     inner = between_places(low, outer, _SHADED * contrast)
     return lines if inner.face is None and inner.front is None else inner
+
+
+def _with_front(
+    lines: ClampLines, plain: Image, state: State, seen: Seen, turn: int
+) -> ClampLines:
+    """Return lines with the front of a clamp that has no colour of its own.
+
+    Its own shade, which is seen in plain light, may lie ahead of it, but not here.
+    """
+    if lines.face is None or lines.front is not None:
+        return lines
+    found = find_clamp(
+        plain, state.curve, expected=lines.face.s, width=state.width, blur=state.blur,
+        contrast=_SHADED * seen.edges.contrast, reach=APART_PX, fine=turn >= _FINE,
+    )  # fmt: skip
+    front = found.front
+    if front is None or abs(front.s - lines.face.s) > APART_PX:
+        return lines
+    return replace(lines, front=front)
 
 
 def _shade_line(lines: ClampLines, state: State, seen: Seen) -> float | None:

@@ -42,6 +42,7 @@ class State:
 
     The blur of the ends, along the rod, is 0 as long as none was fitted; `blurs` is
     that of parts of its sides where it is uneven, as motion makes it on a bent rod.
+    `plain` is the picture's own light where the rod is seen in a mix of colours.
     """
 
     curve: Curve
@@ -58,6 +59,7 @@ class State:
     tip_blur: float = 0.0
     clamp_blur: float = 0.0
     flanks: Flanks | None = None
+    plain: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True, slots=True)

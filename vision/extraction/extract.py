@@ -20,6 +20,7 @@ from ..find.choose import find_rod, search_rod
 from ..find.coloured import shows_another
 from ..find.ground import View
 from ..find.rod import Candidate
+from ..find.shadeless import without_shade
 from ..find.track import Start, start_curve
 from ..measurement import Measurement, Pose, failure
 from ..picture.photo import Photo
@@ -170,6 +171,9 @@ def measure_candidate(
     LostError
         If there is nothing to vouch for.
     """
+    unshaded = without_shade(photo, candidate)
+    if unshaded is not None:
+        candidate, view = unshaded
     strip = along_candidate(view, candidate)
     if is_parted(strip):
         view, candidate = whole_rod(view, candidate)
@@ -219,7 +223,7 @@ def finish(
     LostError
         If there is nothing to vouch for.
     """
-    refined = _refined(view, start, candidate, setting, sd_px)
+    refined = _refined(photo, view, start, candidate, setting, sd_px)
     if np.isfinite(sd_px) and not refined.settled:
         raise LostError("edges_lost", "the rod moved too far since the last frame")
     strip = along_rod(view, refined)
@@ -232,8 +236,9 @@ def finish(
 
 
 def _refined(
-    view: View, start: Start, candidate: Candidate, setting: Setting, sd_px: float
-) -> Refined:
+    photo: Photo, view: View, start: Start, candidate: Candidate, setting: Setting,
+    sd_px: float,
+) -> Refined:  # fmt: skip
     """Return axis, edges and ends; those of a far blurred rod from a wide blur on.
 
     Taken for sharp, a far blurred edge is sought between too close levels, and seems
@@ -246,6 +251,7 @@ def _refined(
             view.grey, replace(start, blur=blur), root=candidate.root, sign=view.sign,
             joints=setting.joints_px, walls=setting.walls_px if walls else None,
             face_px=setting.face_px(start.curve), sd_px=sd_px,
+            plain=None if view.mix is None else photo.grey,
         )  # fmt: skip
 
     least = 0.0 if start.rough else COLLAPSED * start.width

@@ -114,6 +114,7 @@ def refine(
     walls: Walls | None = None,
     face_px: float = 0.0,
     sd_px: float = np.inf,
+    plain: Image | None = None,
 ) -> Refined:
     """Measure axis, edges and ends.
 
@@ -137,6 +138,9 @@ def refine(
         How much of a clamp's face the camera may see, along the rod.
     sd_px : float
         Standard deviation of the start where it tells the ends too, as in a film.
+    plain : ndarray, shape (height, width), float32, optional
+        The picture's own light where `grey` is a mix of its colours: what a clamp that
+        has no colour is seen in.
 
     Raises
     ------
@@ -146,8 +150,9 @@ def refine(
     half = np.full(len(start.curve.s), 0.5 * start.width)
     last = float(start.curve.s[-1])
     state = State(
-        start.curve, half, start.width, 0.0, last, face_px, start.rough, start.blur
-    )
+        start.curve, half, start.width, 0.0, last, face_px, start.rough, start.blur,
+        plain=plain,
+    )  # fmt: skip
     seeking = sd_px > _SURE_PX
     seen = _look(grey, state, sign, 0, seeking=seeking)
     first, end, still_px = 0.0, last, _NEAR_STILL_PX

@@ -71,6 +71,22 @@ class Photo:
             return None
         return _linear(np.ascontiguousarray(pixels[window][..., :3]), linear=False)
 
+    def colour_at(self, points_px: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Return linear blue, green and red of the nearest pixels; None if grey.
+
+        Parameters
+        ----------
+        points_px : ndarray, shape (..., 2)
+            Places (x, y); those beyond the picture are taken at its border.
+        """
+        pixels = None if self.decode is None else self.decode()
+        if pixels is None or pixels.ndim != 3 or pixels.shape[2] < 3:
+            return None
+        last = np.array(self.size_px) - 1
+        x, y = np.moveaxis(np.rint(points_px).astype(int).clip(0, last), -1, 0)
+        light = _linear(np.ascontiguousarray(pixels[y, x, :3]), linear=False)
+        return np.asarray(light, np.float64)
+
     @property
     def size_px(self) -> tuple[int, int]:
         """Width and height, in px."""

@@ -1,0 +1,89 @@
+"""Physics of shades: they keep the paper's colour, and are their rod once more."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from magbend.vision.find.rod import Candidate
+from magbend.vision.find.shadeless import without_shade
+from magbend.vision.picture.photo import as_photo
+
+TAN, RED, BLACK = (0.26, 0.43, 0.58), (0.04, 0.04, 0.45), (0.03, 0.03, 0.03)
+PAPER, WIDTH, AT = np.array([0.70, 0.75, 0.74]), 20.0, 100.0
+X = np.arange(60.0, 340.0)
+
+
+def bent(aside, bend=30.0):
+    """Return an axis across the picture, `aside` px below where a rod is drawn."""
+    return np.column_stack([X, AT + aside + bend * ((X - 60.0) / 280.0) ** 2])
+
+
+def covered(axis, width=WIDTH):
+    fine = np.zeros((800, 1600), np.uint8)
+    side = np.array([0.0, 0.5 * width])
+    corners = np.vstack([axis - side, (axis + side)[::-1]])
+    fixed = np.round((4.0 * (corners + 0.5) - 0.5) * 16).astype(np.int32)
+    cv2.fillPoly(fine, [fixed.reshape(-1, 1, 2)], 255, shift=4)
+    return cv2.resize(fine, (400, 200), interpolation=cv2.INTER_AREA)[..., None] / 255.0
+
+
+def drawn(rod, *, kept, aside, coarse=False, other=None):
+    """Return a photograph of a rod whose shade keeps a share of each colour."""
+    light = PAPER * (1.0 - (1.0 - np.array(kept)) * covered(bent(aside)))
+    for colour, axis in ((rod, bent(0.0)), *([] if other is None else [other])):
+        light = light + (np.array(colour) - light) * covered(axis)
+    light = cv2.GaussianBlur(light, (0, 0), 0.8)
+    light += np.random.default_rng(0).normal(0.0, 0.003, light.shape)
+    code = 255.0 * (1.055 * np.clip(light, 0.004, 1.0) ** (1 / 2.4) - 0.055)
+    pixels = np.rint(code).astype(np.uint8)
+    if coarse:
+        pixels = cv2.imdecode(cv2.imencode(".jpg", pixels, [1, 90])[1], 1)
+    return as_photo(pixels)
+
+
+def candidate(aside):
+    return Candidate(
+        points_px=bent(aside), width_px=WIDTH, length_px=290.0, root="clamp",
+        contacts=1, ratio=0.4,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("aside", [14.0, 45.0])
+def test_paper_and_shade_are_equally_light_and_the_rod_is_not(aside):
+    """Found was the shade, which is darker than the rod; what is left of it is blue."""
+    photo = drawn(TAN, kept=(0.33, 0.3, 0.29), aside=aside)
+    rod, view = without_shade(photo, candidate(aside))
+    middle = np.interp(X, *rod.points_px.T)
+    assert abs(middle - bent(0.0)[:, 1])[20:-20].max() < 1.5
+    assert rod.width_px == pytest.approx(WIDTH, abs=1.5)
+    paper, shade, inside = (
+        np.median(view.grey[int(y) - 1 : int(y) + 2, 80:120])
+        for y in (30.0, AT + aside + 4.0, AT)
+    )
+    assert shade == pytest.approx(paper, abs=0.03)
+    assert paper - inside == pytest.approx(0.65, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("rod", "kept", "aside"),
+    [(TAN, (1.0, 1.0, 1.0), 14.0), (BLACK, (0.4, 0.4, 0.4), 14.0)],
+)
+def test_without_a_shade_or_a_colour_there_is_nothing_to_discount(rod, kept, aside):
+    photo = drawn(rod, kept=kept, aside=aside)
+    assert without_shade(photo, candidate(0.0)) is None
+
+
+def test_what_is_no_copy_of_a_rod_is_not_taken_for_it():
+    wire = RED, bent(48.0, bend=-10.0)
+    photo = drawn((0.2, 0.2, 0.2), kept=(0.5, 0.5, 0.5), aside=16.0, other=wire)
+    assert without_shade(photo, candidate(0.0)) is None
+
+
+def test_where_colours_are_coarse_a_dark_rod_is_seen_in_its_own_light():
+    deep = {"kept": (0.4, 0.4, 0.4), "aside": 14.0}
+    sharp = without_shade(drawn(RED, **deep), candidate(0.0))
+    coarse = without_shade(drawn(RED, coarse=True, **deep), candidate(0.0))
+    assert sharp[1].mix is not None
+    assert coarse[1].mix is None

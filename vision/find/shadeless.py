@@ -1,0 +1,207 @@
+"""The light in which a coloured rod is seen, and its shade on the paper is not.
+
+A shade takes a share of the paper's light, about the same of each colour; what has
+another colour is no shade. So there are weights of blue, green and red in which paper
+and shade are equally light, and the rod is not: the linear discriminant (R. A. Fisher,
+1936) between what is coloured along a rod and what is not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..curve.robust import median
+from ..picture.photo import Photo
+from .ground import View, mixed
+from .rod import Candidate
+from .track import resample
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_BESIDE, _BESIDE_PX = 3.2, 8.0
+"""How far beside an axis the light is looked at: in widths, and beyond that."""
+
+_STATIONS = 60
+"""About so many stations are looked at, on lanes a pixel apart."""
+
+_EVERY = 16
+"""Of so many pixels along and across, one tells the paper's colour."""
+
+_COLOURED, _CLEAR = 0.05, 8.0
+"""How far a rod's colour is from the paper's, in shares of the light of each: at least,
+and over the noise of one pixel."""
+
+_ALL_ALONG = 0.6
+"""Part of the stations at which something coloured is seen."""
+
+_DEEPEST, _COPY, _SHIFT = 0.1, 0.3, 0.05
+"""Light that the deepest shade keeps of the paper's; by how much what lies beside a
+shade may wander from where its rod must be, in widths; and the part of a shift that
+must be seen across a rod, for what lies along it is not."""
+
+_MISSING, _MISSING_PX = 0.03, 0.7
+"""Light of the paper that is missing beside a rod where it has a shade: as that of so
+many widths of bare paper, and of so many px."""
+
+_DARKER, _AS_SHARP = 0.5, 0.92
+"""Light of a rod over that in its shade by which lightness tells them too; and how
+sharp its colour must be then, over that."""
+
+_NOISE, _DEPTH = 0.003, 0.1
+"""Least noise of the light of a pixel; and what a shade takes of it."""
+
+
+def without_shade(photo: Photo, rod: Candidate) -> tuple[Candidate, View] | None:
+    """Return a rod in the light that does not show its shade.
+
+    Parameters
+    ----------
+    photo : Photo
+        The photograph.
+    rod : Candidate
+        A rod, or its shade, or both as one.
+
+    Returns
+    -------
+    tuple of Candidate and View, or None
+        None where there is no shade, or no colour that tells the rod from it.
+    """
+    points, normals, across = _lanes(rod)
+    light = photo.colour_at(points[:, None] + across[:, None] * normals[:, None])
+    paper = paper_colour(photo)
+    if light is None or paper is None:
+        return None
+    share = light / paper
+    tint = _tinted(share)
+    band = _nearest_band(tint > 0.5, across)
+    seen = np.flatnonzero(np.isfinite(band[:, 0]))
+    if len(seen) < _ALL_ALONG * len(points):
+        return None
+    middle = np.interp(np.arange(len(points)), seen, band[seen].mean(axis=1))
+    width = median(np.ptp(band[seen], axis=1))
+    brightness = share.mean(axis=2)
+    if not _is_its_shade(brightness, middle, normals, width, across):
+        return None
+    if _missing_px(brightness, tint) < max(_MISSING * width, _MISSING_PX):
+        return None
+    mix = _discriminant(light, tint, paper)
+    if mix is None:
+        return None
+    along = slice(seen[0], seen[-1] + 1)
+    axis = (points + middle[:, None] * normals)[along]
+    found = replace(rod, points_px=axis, width_px=width)
+    if _is_coarse(brightness, tint, middle, width):
+        return found, View(grey=photo.grey, sign=1.0)
+    b, g, r = (float(part) for part in mix)
+    return found, mixed(photo, (b, g, r), 1.0)
+
+
+def paper_colour(photo: Photo) -> Array | None:
+    """Return the commonest light of each colour, (3,); None for a grey picture."""
+    few = slice(None, None, _EVERY)
+    colour = photo.colour((few, few))
+    return None if colour is None else np.median(colour, axis=(0, 1)).astype(float)
+
+
+def _lanes(rod: Candidate) -> tuple[Array, Array, Array]:
+    """Return points along a rod, their normals, and offsets of lanes beside it."""
+    _, points, theta = resample(rod.points_px, 0.6 * rod.width_px)
+    every = max(1, len(points) // _STATIONS)
+    normals = np.column_stack([-np.sin(theta), np.cos(theta)])
+    reach = _BESIDE * rod.width_px + _BESIDE_PX
+    side = np.arange(1.0, reach)
+    return points[::every], normals[::every], np.concatenate([-side[::-1], [0.0], side])
+
+
+def _nearest_band(on: Mask, across: Array) -> Array:
+    """Return where what is on, next to the axis, begins and ends; (n, 2), or NaN."""
+    lane = np.arange(len(across))
+    nearest = np.argmin(np.where(on, np.abs(across), np.inf), axis=1)[:, None]
+    low = np.where(on | (lane > nearest), -1, lane).max(axis=1) + 1
+    high = np.where(on | (lane < nearest), len(lane), lane).min(axis=1) - 1
+    band = np.column_stack([across[low % len(lane)] - 0.5, across[high] + 0.5])
+    band[~on.any(axis=1)] = np.nan
+    return band
+
+
+def _is_its_shade(
+    share: Array, middle: Array, normals: Array, width: float, across: Array
+) -> bool:
+    """Whether what lies along an axis is part of a rod beside it, or may be its shade.
+
+    A shade is the rod once more, shifted by one vector.
+    """
+    inside: Mask = np.abs(middle) < 0.5 * width
+    if inside.mean() > _ALL_ALONG:
+        return True
+    axis = share[:, len(across) // 2]
+    ridge = len(normals) * _SHIFT**2 * np.eye(2)
+    shift = np.linalg.solve(normals.T @ normals + ridge, normals.T @ middle)
+    astray = median(np.abs(middle - normals @ shift))
+    near = float(np.hypot(*shift)) < across[-1] and astray < _COPY * width
+    return near and median(axis[~inside]) > _DEEPEST
+
+
+def _tinted(share: Array) -> Array:
+    """Return how much of its light is the rod's, 0 to 1, by its colour; (n, m)."""
+    hue = share - share.mean(axis=2, keepdims=True)
+    away = np.linalg.norm(hue, axis=2)
+    most = float(np.quantile(away, 0.97))
+    noise = 0.7 * median(np.abs(np.diff(hue, axis=0)).max(axis=2).ravel())
+    if most < max(_COLOURED, _CLEAR * noise):
+        return np.zeros(away.shape)
+    strong = hue[away > 0.6 * most]
+    direction = np.median(strong, axis=0)
+    direction /= np.linalg.norm(direction)
+    return np.asarray(hue @ direction / np.median(strong @ direction))
+
+
+def _missing_px(share: Array, tint: Array) -> float:
+    """Return how much of the paper's light is missing beside a rod, px of bare paper.
+
+    Blur mixes the light of rod and paper, and so their tints; a shade has none.
+    """
+    paper = np.quantile(share, 0.85, axis=1, keepdims=True)
+    rod = median((share / paper)[tint > 0.8])
+    missing = 1.0 - (1.0 - rod) * tint - share / paper
+    return float(np.quantile(np.sum(missing * (tint < 0.5), axis=1), 0.7))
+
+
+def _is_coarse(share: Array, tint: Array, middle: Array, width: float) -> bool:
+    """Whether colours are less sharp than lightness, which tells the rod as well.
+
+    JPEG keeps every other pixel's colour; those of most sensors are guessed from their
+    neighbours'. In one light, blurred alike, both change by the same share per pixel.
+    """
+    rod = median(share[tint > 0.8])
+    if rod > _DARKER * np.quantile(share[np.abs(tint) < 0.2], 0.1):
+        return False
+    lane = np.arange(-width, width) + 0.5 * share.shape[1]
+    sharp, hue = (
+        np.abs(np.diff(_typical(part, lane + middle[:, None]))).max()
+        for part in (share / (1.0 - rod), tint)
+    )
+    return bool(hue < _AS_SHARP * sharp)
+
+
+def _typical(part: Array, lane: Array) -> Array:
+    """Return the median of profiles, each from a lane of its own on."""
+    own = np.arange(part.shape[1])
+    rows = [np.interp(at, own, row) for at, row in zip(lane, part, strict=True)]
+    return np.asarray(np.median(rows, axis=0))
+
+
+def _discriminant(light: Array, tint: Array, paper: Array) -> Array | None:
+    """Return weights in which the paper is 0.65 lighter than the rod."""
+    rod, ground = light[tint > 0.8], light[np.abs(tint) < 0.2]
+    if min(len(rod), len(ground)) < 50:
+        return None
+    shade = _DEPTH * paper
+    within = np.cov(ground.T) + np.outer(shade, shade) + _NOISE**2 * np.eye(3)
+    step = np.median(ground, axis=0) - np.median(rod, axis=0)
+    mix = np.linalg.solve(within, step)
+    return np.asarray(0.65 * mix / (mix @ step))
