@@ -7,6 +7,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.checks import positive
 from ...core.errors import VisionError
@@ -14,7 +15,7 @@ from ...core.progress import Progress, silent
 from ..extraction.follow import follow
 from ..extraction.ring import Ringing, ring_down
 from ..extraction.setting import Setting
-from ..measurement import Measurement
+from ..measurement import NAN2, Measurement
 from ..picture.photo import Photo, as_photo, refuse_special
 
 
@@ -62,6 +63,9 @@ def ring_of_film(
 ) -> Ringing:  # fmt: skip
     """Return how the tip of a rod rings in a film that begins before it is let go.
 
+    The tip is taken in the frame of the board: neither clamp nor camera moves in such a
+    film, and in a picture the rod's own frame is known ten times less well than a tip.
+
     Parameters
     ----------
     path : Path
@@ -87,11 +91,12 @@ def ring_of_film(
     rate = told if fps is None else positive(fps, "fps", "frames/s")
     if not rate > 0.0:
         raise VisionError(f"{path.name}: does not say its frames per second: give them")
-    tips: list[tuple[float, float]] = []
+    tips: list[NDArray[np.float64]] = []
     last: Measurement | None = None
     for number, photo in enumerate(frames, start=1):
         last = follow(photo, setting, last)
-        tips.append(last.tip_mm)
+        at = NAN2 if last.pose is None else last.pose.to_board(np.array([last.tip_mm]))
+        tips.append(np.ravel(at))
         progress(number, max(count, number))
     if last is None or not np.any(np.isfinite(tips)):
         why = "it has no frames" if last is None else last.reason

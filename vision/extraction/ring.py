@@ -1,8 +1,14 @@
 """How a rod rings after a step: frequency, damping and settling from its tip's path.
 
-A free vibration in one mode is x(t) = r + exp(-d t) (a cos w t + b sin w t). For given
-w and d the other three numbers follow by linear least squares, so only two are sought
-(variable projection, Golub and Pereyra 1973).
+A small free vibration in one mode is x(t) = r + exp(-d t) (a cos w t + b sin w t). A
+large one is not: the tip runs on a bent path and the rod stiffens, which adds terms of
+the amplitude's square (at frequencies 0 and 2 w, with decay 2 d) and cube (w and 3 w, 3
+d; Nayfeh and Mook 1979, section 2.3). Taken for small, a swing by 20 degrees has its
+damping wrong by ten deviations. How many terms the path needs is weighed by Akaike's
+criterion, which rather takes one too many than leaves out one that is there.
+
+For given w and d the other numbers follow by linear least squares, so only two are
+sought (variable projection, Golub and Pereyra 1973).
 """
 
 from __future__ import annotations
@@ -19,12 +25,16 @@ Array = NDArray[np.float64]
 
 LEAST_FRAMES = 12
 """Frames from the largest deflection on that two numbers can be told from."""
-_HELD = 0.96
-"""Share of the largest deflection at which the rod is let go."""
+_FREE = 0.5
+"""Share of the largest deflection below which the rod is surely let go: it is held in
+the frame before its release, and moves otherwise than a vibration carried back."""
 _CLEAR = 3.0
 """Amplitude over the residual, below which nothing rings."""
 _DECAYS = 0.0, 0.01, 0.03, 0.1, 0.3
 """Damping ratios from which the best fit is sought."""
+_TERMS = ((0, 0), (1, 1)), ((2, 0), (2, 2)), ((3, 1), (3, 3))
+"""What the amplitude's first power adds, its square and its cube: times the decay, and
+times the frequency."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +48,7 @@ class Ringing:
     damping_ratio, damping_ratio_sd : float
         Decay rate over the angular frequency without damping.
     amplitude_mm : float
-        At the first frame that was used.
+        At the first frame that was used, without what its square and cube add.
     settle_s, settle_sd_s : float
         From there until the amplitude is below what counts as settled; infinite for a
         vibration that does not die away.
@@ -47,7 +57,7 @@ class Ringing:
     residual_mm : float
         Standard deviation of what the model leaves.
     first_s : float
-        Time of the first frame that was used.
+        Time of the first frame that was used, the rod being let go.
     frames : int
         How many were used.
     """
@@ -107,22 +117,21 @@ def ring_down(time_s: Array, tip_mm: Array, *, settle_mm: float = 0.05) -> Ringi
         )
     start, t = float(t[0]), t - t[0]
     best = min((_start(t, place, ratio) for ratio in _DECAYS), key=_loss)
-    (omega, decay), jacobian = _refined(t, place, best[0])
-    residual, (rest, a, b) = _left(t, place, omega, decay)
-    freedom = max(1, len(t) - 5)
-    sd = math.sqrt(float(residual @ residual) / freedom)
+    found, covariance, sd = _weighed(_fits(t, place, best[0]))
+    omega, decay, rest, a, b = found.tolist()
     amplitude = math.hypot(a, b)
     if not amplitude > _CLEAR * sd:
         raise VisionError(
             "the tip does not ring: its largest deflection is "
             f"{amplitude:.3f} mm and {sd:.3f} mm of its path is no vibration"
         )
-    covariance = sd**2 * np.linalg.pinv(jacobian.T @ jacobian)
-    omega_sd, decay_sd = np.sqrt(np.diag(covariance))
+    omega_sd, decay_sd = np.sqrt(np.diag(covariance)[:2])
     settled = math.log(max(amplitude / settle_mm, 1.0))
     settle_s = settle_sd_s = math.inf
     if decay > 0.0:
-        settle_s, settle_sd_s = settled / decay, settled * float(decay_sd) / decay**2
+        settle_s = settled / decay
+        by = np.array([0.0, -settle_s, 0.0, a / amplitude**2, b / amplitude**2]) / decay
+        settle_sd_s = math.sqrt(by @ covariance @ by) if settled else 0.0
     return Ringing(
         frequency_Hz=omega / (2.0 * math.pi),
         frequency_sd_Hz=float(omega_sd) / (2.0 * math.pi),
@@ -130,7 +139,7 @@ def ring_down(time_s: Array, tip_mm: Array, *, settle_mm: float = 0.05) -> Ringi
         damping_ratio_sd=float(decay_sd) / math.hypot(omega, decay),
         amplitude_mm=amplitude,
         settle_s=settle_s, settle_sd_s=settle_sd_s,
-        rest_mm=float(rest), residual_mm=sd, first_s=start, frames=len(t),
+        rest_mm=rest, residual_mm=sd, first_s=start, frames=len(t),
     )  # fmt: skip
 
 
@@ -144,7 +153,7 @@ def _along_the_motion(tip: Array) -> Array:
 
 
 def _release(place: Array) -> int:
-    """Return the last frame of the largest deflection before the tip swings back.
+    """Return the first frame in which the tip surely swings back freely.
 
     A film may begin while the rod is still held.
     """
@@ -156,29 +165,89 @@ def _release(place: Array) -> int:
     away *= np.sign(away[largest]) or 1.0
     crossed = np.flatnonzero(away[largest:] < 0.0)
     end = largest + int(crossed[0]) if crossed.size else len(place)
-    held = np.flatnonzero(away[:end] >= _HELD * away[largest])
-    return int(held[-1])
+    held = np.flatnonzero(away[:end] >= _FREE * away[largest])
+    return int(held[-1]) + 1
 
 
-def _left(t: Array, place: Array, omega: float, decay: float) -> tuple[Array, Array]:
-    """Return what the model leaves, and its rest, cosine and sine."""
-    fades = np.exp(-np.clip(decay, -5.0, 1e4) * t)
-    design = np.column_stack(
-        [np.ones_like(t), fades * np.cos(omega * t), fades * np.sin(omega * t)]
-    )
-    found = np.linalg.lstsq(design, place, rcond=None)[0]
-    return np.asarray(place - design @ found), np.asarray(found)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Fit:
+    """A vibration with terms up to one power of its amplitude.
+
+    `found` are angular frequency, decay, rest, and the linear term's cosine and sine.
+    """
+
+    found: Array
+    covariance: Array
+    sd: float
+    criterion: float
 
 
-def _refined(t: Array, place: Array, start: Array) -> tuple[tuple[float, float], Array]:
-    """Return the best angular frequency and decay, and how residuals go with them."""
+def _fits(t: Array, place: Array, start: Array) -> list[_Fit]:
+    """Return the fits of all powers that so many frames can tell."""
+    fits: list[_Fit] = []
+    for power in range(1, len(_TERMS) + 1):
+        start = _refined(t, place, start, power)
+        residual, linear, design, by_omega, by_decay = _left(
+            t, place, start[0], start[1], power
+        )
+        unknown = len(linear) + 2
+        if fits and len(t) < 2 * unknown:
+            break
+        rows = np.column_stack([by_omega @ linear, by_decay @ linear, design])
+        loss = float(residual @ residual)
+        variance = loss / max(1, len(t) - unknown)
+        inverse = np.linalg.pinv(rows.T @ rows)
+        fits.append(_Fit(
+            found=np.array([abs(start[0]), start[1], *linear[:3]]),
+            covariance=variance * inverse[:5, :5], sd=math.sqrt(variance),
+            criterion=len(t) * math.log(loss + 1e-30) + 2.0 * unknown,
+        ))  # fmt: skip
+    return fits
+
+
+def _weighed(fits: list[_Fit]) -> tuple[Array, Array, float]:
+    """Return the mean of the fits, weighed by likelihood, its covariance and noise.
+
+    The covariance holds the doubt which of them is right (Hoeting et al. 1999).
+    """
+    loss = np.array([fit.criterion for fit in fits])
+    weights = np.exp(-0.5 * (loss - loss.min()))
+    weights /= weights.sum()
+    each = np.array([fit.found for fit in fits])
+    found = weights @ each
+    covariance = (weights * (each - found).T) @ (each - found)
+    for fit, weight in zip(fits, weights, strict=True):
+        covariance += weight * fit.covariance
+    return found, covariance, fits[int(np.argmax(weights))].sd
+
+
+def _left(
+    t: Array, place: Array, omega: float, decay: float, power: int = 1
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Return what the model leaves, its factors, its terms, and what changes these.
+
+    The first three factors are rest, cosine and sine; terms change with the angular
+    frequency and with the decay.
+    """
+    decay = min(max(decay, -5.0), 1e4)
+    columns = []
+    for times, harmonic in (term for terms in _TERMS[:power] for term in terms):
+        wave = np.exp(-times * decay * t) * np.exp(1j * harmonic * omega * t)
+        each = np.array([wave, 1j * harmonic * t * wave, -times * t * wave])
+        columns += [each.real, each.imag] if harmonic else [each.real]
+    design, by_omega, by_decay = np.moveaxis(np.array(columns), 0, 2)
+    linear = np.linalg.lstsq(design, place, rcond=None)[0]
+    return np.asarray(place - design @ linear), linear, design, by_omega, by_decay
+
+
+def _refined(t: Array, place: Array, start: Array, power: int) -> Array:
+    """Return the best angular frequency and decay."""
     from scipy.optimize import least_squares
 
     def left(x: Array) -> Array:
-        return _left(t, place, float(x[0]), float(x[1]))[0]
+        return _left(t, place, float(x[0]), float(x[1]), power)[0]
 
-    done = least_squares(left, start, x_scale=np.abs(start) + 0.1)
-    return (abs(float(done.x[0])), float(done.x[1])), np.asarray(done.jac)
+    return np.asarray(least_squares(left, start, x_scale=np.abs(start) + 0.1).x)
 
 
 def _loss(found: tuple[Array, float]) -> float:
@@ -186,10 +255,12 @@ def _loss(found: tuple[Array, float]) -> float:
 
 
 def _start(t: Array, place: Array, ratio: float) -> tuple[Array, float]:
-    """Return the best of a grid of frequencies up to half that of the frames."""
+    """Return the likeliest of a grid of frequencies, and its loss; a matched filter."""
     step = float(np.median(np.diff(t)))
-    low, high = math.pi / t[-1], math.pi / step
-    grid = np.arange(low, high, 0.5 * math.pi / t[-1])
-    losses = [float(np.sum(_left(t, place, w, ratio * w)[0] ** 2)) for w in grid]
-    best = int(np.argmin(losses))
-    return np.array([grid[best], ratio * grid[best]]), losses[best]
+    grid = np.arange(math.pi / t[-1], math.pi / step, 0.5 * math.pi / t[-1])[:, None]
+    waves = np.exp((1j - ratio) * grid * t)
+    power = np.sum(np.abs(waves) ** 2, axis=1)
+    best = int(np.argmax(np.abs(waves @ (place - place.mean())) ** 2 / power))
+    omega = float(grid[best, 0])
+    residual = _left(t, place, omega, ratio * omega)[0]
+    return np.array([omega, ratio * omega]), float(residual @ residual)
