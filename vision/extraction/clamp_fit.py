@@ -21,7 +21,7 @@ from ..edge.wall_light import WALL_PLACES
 from ..find.ground import View
 from .deviations import is_dark, white_px
 from .refine import Refined
-from .setting import Setting, silhouette
+from .setting import Setting
 from .told_clamp import ToldClamp, surer_direction
 
 Array = NDArray[np.float64]
@@ -90,7 +90,7 @@ def fit_clamp(
     curve, root = refined.fit.curve, told.root
     s = np.linspace(root.s, refined.tip.s, WALL_PLACES)
     view = setting.view(camera, *curve.at(s))
-    wall = view.rise_across * np.interp(s, curve.s, refined.width) / silhouette(view)
+    wall = setting.wall_px(view, np.interp(s, curve.s, refined.width))
     rod_sd = _rod_sd(refined, np.interp(curve.s, s, wall), seen_in)
     heading = float(view.heading[0])
     turn, turn_sd = _front(refined, setting, camera, heading)

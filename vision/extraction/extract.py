@@ -244,7 +244,7 @@ def _refined(
     Taken for sharp, a far blurred edge is sought between too close levels, and seems
     the sharper for it; from the other end its blur is found.
     """
-    walls = setting.calibration is not None and view.sign > 0.0
+    walls = setting.calibration is not None and view.sign > 0.0 and not setting.is_round
 
     def from_blur(blur: float) -> Refined:
         return refine(

@@ -61,7 +61,7 @@ class RootPlace:
 
 
 def root_place(
-    refined: Refined, ends: LocalView, setting: Setting, side_mm: float
+    refined: Refined, ends: LocalView, setting: Setting, height_mm: float
 ) -> RootPlace:
     """Return where the axis leaves the clamp, on the fitted curve.
 
@@ -73,8 +73,8 @@ def root_place(
         How the camera sees its ends, the root first.
     setting : Setting
         What is known.
-    side_mm : float
-        Side of its section.
+    height_mm : float
+        Height of its section.
     """
     if refined.clamp is None:
         return RootPlace(s=0.0, sd=BORDER_PX)
@@ -87,7 +87,7 @@ def root_place(
         return RootPlace(s=place, sd=_sd(line, carried, hidden), hidden=hidden)
     seen_at, axis_mm = [], setting.axis_height_mm
     if face is not None:
-        seen_at.append(_below(refined, face, axis_mm + 0.5 * side_mm, setting))
+        seen_at.append(_below(refined, face, axis_mm + 0.5 * height_mm, setting))
     if front is not None:
         seen_at.append(_below(refined, front, 0.0, setting))
     if not seen_at:

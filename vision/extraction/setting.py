@@ -46,6 +46,11 @@ class Setting:
         How well that is known: then a length is off that differs by three deviations.
     side_mm : float or None
         Nominal side of its section: tells the rod from other long thin things.
+    is_round : bool
+        Whether its section is a circle: it is seen no wider than it is, from whatever
+        side, and has no walls.
+    height_share : float
+        Height of its section over the side that the camera sees.
     colour : str or None
         What it looks like on white paper, ``#rrggbb``: tells it from its shade too.
     clamp : {"auto", "none"}
@@ -71,6 +76,8 @@ class Setting:
     length_mm: float | None = None
     length_sd_mm: float | None = None
     side_mm: float | None = None
+    is_round: bool = False
+    height_share: float = 1.0
     colour: str | None = None
     clamp: Clamp = "auto"
     clamp_height_mm: float | None = None
@@ -130,8 +137,21 @@ class Setting:
         if self.calibration is None:
             return np.zeros(len(points)), np.zeros(len(points))
         view = self.view(self.calibration, points, theta)
-        wall = view.rise_across * width_px / silhouette(view)
+        wall = self.wall_px(view, width_px)
         return wall, view.rise_across * self.axis_height_mm - 0.5 * wall
+
+    def silhouette(self, view: LocalView) -> Array:
+        """Return the pixels between the edges of a rod per mm of its side."""
+        if self.is_round:
+            return np.hypot(view.across, view.rise_across)
+        return view.across + self.height_share * np.abs(view.rise_across)
+
+    def wall_px(self, view: LocalView, width_px: Array | float) -> Array:
+        """Return how wide a side wall is seen of a rod of a width in pixels."""
+        if self.is_round:
+            return np.zeros_like(view.across)
+        rise = self.height_share * view.rise_across
+        return np.asarray(rise * width_px / self.silhouette(view))
 
     def face_px(self, curve: Curve) -> float:
         """Return how much of a clamp's face may be seen at the root of a curve."""
@@ -156,8 +176,9 @@ def with_specimen(setting: Setting, specimen: Specimen) -> Setting:
     setting : Setting
         What is known already; it is kept.
     specimen : Specimen
-        Tells side, length, joints and colour.
+        Tells shape, side, length, joints and colour.
     """
+    section = specimen.cross_sections[0]
     own_sd_mm = specimen.length_sd_mm if setting.length_mm is None else None
     return replace(
         setting,
@@ -165,13 +186,10 @@ def with_specimen(setting: Setting, specimen: Specimen) -> Setting:
         side_mm=setting.side_mm or specimen.side_mm,
         length_mm=setting.length_mm or specimen.length_mm,
         joints_mm=setting.joints_mm or specimen.joints_mm,
+        is_round=section.is_round,
+        height_share=section.height_mm / section.width_mm,
         colour=setting.colour or specimen.colour,
     )
-
-
-def silhouette(view: LocalView) -> Array:
-    """Return the pixels between the edges of a rod per mm of its side."""
-    return view.across + np.abs(view.rise_across)
 
 
 def arc_mm(points: Array) -> Array:

@@ -3,9 +3,10 @@
 A square rod seen obliquely shows a side face, and an end face: the silhouette is wider
 than the top face and reaches past the axis' end. Its middle is the axis. With g the
 shift in the picture of a point per mm of height (from the calibration), n across and t
-along the rod, m the pixels per mm: the silhouette of a side a is a (m + |g.n|) wide, it
-ends |g.t| a / 2 past the axis' tip, and the clamp's front plane appears shifted by
-(g.t) z at a height z above the axis.
+along the rod, m the pixels per mm: the silhouette of a side a is a (m + |g.n|) wide (of
+a round rod, which has no side face, a sqrt(m^2 + (g.n)^2)), it ends |g.t| a / 2 past
+the axis' tip, and the clamp's front plane appears shifted by (g.t) z at a height z
+above the axis.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from .clamp_fit import ClampFit, fit_clamp
 from .deviations import is_dark, side_face, with_deviations
 from .refine import Refined
 from .root import root_place
-from .setting import Setting, arc_mm, silhouette
+from .setting import Setting, arc_mm
 from .told_clamp import told_clamp
 
 Array = NDArray[np.float64]
@@ -104,9 +105,10 @@ def _calibrated(
 ) -> Measurement:  # fmt: skip
     curve = refined.fit.curve
     ends = setting.view(camera, curve.points[[0, -1]], curve.theta[[0, -1]])
-    side_mm = refined.typical_width / float(silhouette(ends).mean())
-    last = refined.tip.s - 0.5 * side_mm * abs(float(ends.rise_along[1]))
-    seen = root_place(refined, ends, setting, side_mm)
+    side_mm = refined.typical_width / float(setting.silhouette(ends).mean())
+    height_mm = setting.height_share * side_mm
+    last = refined.tip.s - 0.5 * height_mm * abs(float(ends.rise_along[1]))
+    seen = root_place(refined, ends, setting, height_mm)
     told = told_clamp(seen, tag, refined, setting, camera)
     clamp = fit_clamp(told, refined, seen_in, setting, camera)
     s = np.linspace(clamp.s, last, 4 * POINTS)
@@ -132,8 +134,8 @@ def _in_frame(
     points, theta = grid.at(s)
     view = setting.view(camera, points, theta)
     heading, angle_deg = view.heading, clamp.angle_deg
-    across = silhouette(view)
-    wall = view.rise_across * np.interp(s, grid.s, refined.width) / across
+    across = setting.silhouette(view)
+    wall = setting.wall_px(view, np.interp(s, grid.s, refined.width))
     pose = Pose(
         x_mm=float(view.x_mm[0]), y_mm=float(view.y_mm[0]),
         angle_deg=angle_deg, height_mm=setting.axis_height_mm,
