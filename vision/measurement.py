@@ -83,11 +83,14 @@ class Motion:
         Of the three, of the point that moves most.
     push_px : float
         Standard deviation of the change of an acceleration from frame to frame.
+    looked : Measurement
+        Of the last frame in which joints were sought, and what lies around the rod.
     """
 
     state_px: NDArray[np.float64]
     covariance: NDArray[np.float64]
     push_px: float
+    looked: Measurement
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,6 +132,9 @@ class Measurement:
         Weights of blue, green and red in whose light it was measured; None is grey.
     seen_px : tuple of ndarray, shape (n, 2)
         Of a failed one: axes of the things that might have been the rod.
+    joints_px : ndarray or None
+        Arc lengths in px of the joints that were found or told; None where none were
+        sought.
     motion : Motion or None
         Of a frame of a film: how the rod moves (`extraction.motion`).
     """
@@ -155,6 +161,9 @@ class Measurement:
     inverted: bool = False
     mix: tuple[float, float, float] | None = None
     seen_px: tuple[NDArray[np.float64], ...] = ()
+    joints_px: NDArray[np.float64] | None = field(
+        default=None, repr=False, compare=False
+    )
     motion: Motion | None = field(default=None, repr=False, compare=False)
 
     @property

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from magbend.vision import Setting, as_photo, extract, follow
+from magbend.vision.extraction import extract as extract_module
 from magbend.vision.extraction import follow as follow_module
+from magbend.vision.extraction import refine as refine_module
 from magbend.vision.synthetic import Light, curve, draw, signed_distance
 
 SIZE, AT = (900, 640), (180.0, 520.0)
@@ -89,3 +91,35 @@ def test_light_rods_and_rods_from_the_border_are_followed(monkeypatch):
         assert found.ok
         assert ("clamp_at_border" in found.flags) is ("at" in options)
         assert abs(signed_distance(found.points_px, drawn.truth.points_px)).max() < 0.2
+
+
+def test_what_is_known_of_a_rod_at_rest_is_not_looked_for_again(first, monkeypatch):
+    def look(*_args, **_options):
+        raise AssertionError("it was looked for again")
+
+    monkeypatch.setattr(refine_module, "find_joints", look)
+    monkeypatch.setattr(extract_module, "along_rod", look)
+    found = follow(as_photo(frame(40.0, seed=3).image), SETTING, first)
+    assert found.motion.looked is first.motion.looked
+    np.testing.assert_allclose(found.joints_px, first.joints_px, atol=1.0)
+
+
+def test_joints_are_sought_again_where_a_rod_is_more_bent():
+    found = follow(as_photo(frame(1.0).image), SETTING)
+    straight = found
+    for bend_deg in np.arange(3.0, 46.0, 3.0):
+        found = follow(as_photo(frame(bend_deg).image), SETTING, found)
+    assert found.motion.looked is not straight
+    whole = extract(as_photo(frame(45.0).image), SETTING.calibration)
+    np.testing.assert_allclose(found.joints_px, whole.joints_px, atol=4.0)
+
+
+@pytest.mark.parametrize("at", [0.5, 1.0])
+def test_what_comes_across_a_followed_rod_or_to_its_tip_is_seen(first, at):
+    image = frame(40.0, seed=4).image.copy()
+    x, y = np.rint(first.points_px[int(at * (len(first.points_px) - 1))]).astype(int)
+    image[y - 20 : y + 20, x - 120 : x + 120] = 40
+    whole = extract(as_photo(image), SETTING.calibration)
+    found = follow(as_photo(image), SETTING, first)
+    assert not whole.ok
+    assert found.flags == whole.flags

@@ -31,7 +31,7 @@ def followed(motion, frames=40):
         points, sd = expected(last.motion)
         found = frame(line(k, motion), seed=k)
         rows.append([np.hypot(*(found.points_px - points).T).max(), sd])
-        last = moved_on(last.motion, found) or begun(found)
+        last = moved_on(last.motion, found, found) or begun(found)
     return np.array(rows).T
 
 

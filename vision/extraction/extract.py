@@ -25,7 +25,16 @@ from ..find.track import Start, start_curve
 from ..measurement import Measurement, Pose, failure
 from ..picture.photo import Photo
 from .bare import flattened
-from .quality import OTHER_COLOUR, OTHER_ROD, TIP_GOES_ON, doubts, refusal
+from .quality import (
+    AROUND,
+    OTHER_COLOUR,
+    OTHER_ROD,
+    TIP_GOES_ON,
+    doubts,
+    doubts_around,
+    is_as_before,
+    refusal,
+)
 from .refine import Refined, refine
 from .setting import Setting
 from .specimen_frame import measurement
@@ -203,7 +212,7 @@ def measure_candidate(
 
 def finish(
     photo: Photo, view: View, start: Start, candidate: Candidate, setting: Setting, *,
-    sd_px: float = np.inf,
+    sd_px: float = np.inf, last: Measurement | None = None,
 ) -> Measurement:  # fmt: skip
     """Refine, judge and turn into mm what starts from a curve near the axis.
 
@@ -217,27 +226,43 @@ def finish(
         What is known.
     sd_px : float
         How surely the start tells the rod and its ends; see `refine`.
+    last : Measurement, optional
+        The same rod, about as bent, in another frame of a film: its joints are where
+        they were, and so is what lies around it unless the rod is seen differently.
 
     Raises
     ------
     LostError
         If there is nothing to vouch for.
     """
-    refined = _refined(photo, view, start, candidate, setting, sd_px)
+    joints = None if last is None else last.joints_px
+    refined = _refined(photo, view, start, candidate, setting, sd_px, joints)
     if np.isfinite(sd_px) and not refined.settled:
         raise LostError("edges_lost", "the rod moved too far since the last frame")
-    strip = along_rod(view, refined)
-    refusal(photo, view, strip, refined, candidate)
-    result = measurement(
-        refined, view, setting, _told(photo, setting, refined.fit.curve)
-    )
-    result = replace(result, inverted=view.sign < 0.0, mix=view.mix)
-    return doubts(result, photo, strip, refined, candidate, setting)
+    result = None if last is None else _in_mm(photo, view, refined, setting)
+    if result is not None and last is not None and is_as_before(result, last):
+        around = AROUND & set(last.flags)
+    else:
+        strip = along_rod(view, refined)
+        refusal(photo, view, strip, refined, candidate)
+        around = doubts_around(photo, strip, refined, candidate, setting)
+    if result is None:
+        result = _in_mm(photo, view, refined, setting)
+    return doubts(result, photo, around, refined, candidate, setting)
+
+
+def _in_mm(photo: Photo, view: View, refined: Refined, setting: Setting) -> Measurement:
+    """Return the measurement of a refined rod, without a word of doubt."""
+    told = _told(photo, setting, refined.fit.curve)
+    return replace(
+        measurement(refined, view, setting, told), inverted=view.sign < 0.0,
+        mix=view.mix, joints_px=refined.joints,
+    )  # fmt: skip
 
 
 def _refined(
     photo: Photo, view: View, start: Start, candidate: Candidate, setting: Setting,
-    sd_px: float,
+    sd_px: float, joints: Array | None,
 ) -> Refined:  # fmt: skip
     """Return axis, edges and ends; those of a far blurred rod from a wide blur on.
 
@@ -251,7 +276,7 @@ def _refined(
             view.grey, replace(start, blur=blur), root=candidate.root, sign=view.sign,
             joints=setting.joints_px, walls=setting.walls_px if walls else None,
             face_px=setting.face_px(start.curve), sd_px=sd_px,
-            plain=None if view.mix is None else photo.grey,
+            known_joints=joints, plain=None if view.mix is None else photo.grey,
         )  # fmt: skip
 
     least = 0.0 if start.rough else COLLAPSED * start.width

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.errors import MagbendError
 from ..camera.oriented import oriented
@@ -25,12 +26,19 @@ from ..picture.photo import Photo
 from .bare import flattened
 from .extract import BROKEN, finish, measure
 from .motion import begun, expected, moved_on
+from .quality import is_as_before
 from .setting import Setting, arc_mm
+
+Array = NDArray[np.float64]
 
 REACHES = 1.0, 3.0
 """How far from where it is expected the rod is sought, in its widths."""
 CLOSE = 0.11
 """Standard deviation of where it is expected, in its widths, that edges bear."""
+
+MORE_BENT, LITTLE_BENT = 1.2, 0.02
+"""Turn of the rod from root to tip, over that in the last frame that was looked at, and
+rad on top, for which it is again: joints show by how the rod bends."""
 
 SAME_LENGTH, SAME_WIDTH = 0.04, 0.15
 """By what part a rod may be longer or wider than in the last frame, at most."""
@@ -89,6 +97,8 @@ def _near(photo: Photo, setting: Setting, last: Measurement) -> Measurement | No
     if last.motion is None:
         return None
     points, sd = expected(last.motion)
+    looked = last.motion.looked
+    bent = _turn(points) > MORE_BENT * _turn(looked.points_px) + LITTLE_BENT
     rod = Candidate(
         points_px=points, width_px=last.width_px, length_px=last.length_px,
         root=_root(last), contacts=1, ratio=0.0,
@@ -105,11 +115,15 @@ def _near(photo: Photo, setting: Setting, last: Measurement) -> Measurement | No
             start = _start(view, rod, reach) if reach else _expected(rod)
             if start is None:
                 continue
-            found = finish(photo, view, start, rod, setting, sd_px=reach or sd)
+            found = finish(
+                photo, view, start, rod, setting, sd_px=reach or sd,
+                last=None if bent else looked,
+            )  # fmt: skip
         except (LostError, *BROKEN):
             continue
         if found.ok and _same(found.length_px, found.width_px, last):
-            moved = moved_on(last.motion, found)
+            kept = not bent and is_as_before(found, looked)
+            moved = moved_on(last.motion, found, looked if kept else found)
             if moved is not None:
                 return moved
     return None
@@ -124,6 +138,12 @@ def _expected(rod: Candidate) -> Start:
     theta = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
     line = Curve(s=even, points=points, theta=theta, kappa=np.gradient(theta, even[1]))
     return Start(curve=line, width=rod.width_px, rough=False, blur=1.0)
+
+
+def _turn(points: Array) -> float:
+    """Return by how much a polyline turns in all, rad."""
+    steps = np.diff(points[::4], axis=0)
+    return float(np.ptp(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))))
 
 
 def _start(view: View, rod: Candidate, reach: float) -> Start | None:

@@ -43,6 +43,7 @@ def begun(found: Measurement) -> Measurement:
     motion = Motion(
         state_px=np.stack([points, np.zeros_like(points), np.zeros_like(points)]),
         covariance=np.diag([SEEN_PX, speed, 0.3 * speed]) ** 2, push_px=0.1 * speed,
+        looked=found,
     )  # fmt: skip
     return replace(found, motion=motion)
 
@@ -53,7 +54,9 @@ def expected(motion: Motion) -> tuple[Array, float]:
     return _carried(motion)[0], math.sqrt(variance)
 
 
-def moved_on(motion: Motion, found: Measurement) -> Measurement | None:
+def moved_on(
+    motion: Motion, found: Measurement, looked: Measurement
+) -> Measurement | None:
     """Return a frame's measurement with the motion so far; None where it is lost.
 
     Parameters
@@ -62,6 +65,8 @@ def moved_on(motion: Motion, found: Measurement) -> Measurement | None:
         Up to the frame before.
     found : Measurement
         The same number of points, measured.
+    looked : Measurement
+        The last frame in which what lies around the rod was looked at.
     """
     state, covariance = _carried(motion), _covariance(motion)
     variance = covariance[0, 0] + SEEN_PX**2
@@ -78,6 +83,7 @@ def moved_on(motion: Motion, found: Measurement) -> Measurement | None:
         state_px=state + gain[:, None, None] * innovation,
         covariance=covariance - np.outer(gain, covariance[0]),
         push_px=max(math.sqrt(push), LEAST_PUSH_PX),
+        looked=looked,
     )
     return replace(found, motion=updated)
 

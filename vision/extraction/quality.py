@@ -38,7 +38,15 @@ TURN_MM = 0.15
 SCALE = 5e-4
 """Doubt of the scale, for want of the camera's height, above which it is named."""
 
+CLAMP_DOUBTFUL = "clamp_doubtful"
 TIP_GOES_ON, OTHER_ROD, OTHER_COLOUR = "tip_goes_on", "other_rod", "colour_mismatch"
+
+AROUND = {OTHER_ROD, CLAMP_DOUBTFUL, TIP_GOES_ON}
+"""Doubts for what lies around a rod."""
+
+SAME_SD, LESS_SEEN = 2.0, 0.01
+"""Deviations by which length and width may differ, and part of the rod that may be seen
+less well, with nothing across it."""
 
 OVER_PAPER, OVER_PAPER_ROUGH = 1.0, 3.0
 """Widths of bare paper under an axis that are more than a speck, or than a gap in a
@@ -100,15 +108,48 @@ def refusal(
         raise LostError("no_rod", "what looks like a rod is shorter than five widths")
 
 
+def doubts_around(
+    photo: Photo, strip: Strip, refined: Refined, candidate: Candidate, setting: Setting
+) -> set[str]:
+    """Return the doubts for what lies around a rod."""
+    found = set()
+    after_gap = not refined.rough and goes_on_after_gap(strip, refined)
+    crossed = candidate.told and crossed_at(strip, refined) is not None
+    if candidate.rivalled or after_gap or crossed:
+        found.add(OTHER_ROD)
+    face_px = setting.face_px(refined.fit.curve)
+    if candidate.root == "clamp" and _goes_on(strip, refined, face_px):
+        found.add(CLAMP_DOUBTFUL)
+    if not refined.rough and tip_goes_on(photo, strip, refined):
+        found.add(TIP_GOES_ON)
+    return found
+
+
+def is_as_before(result: Measurement, last: Measurement) -> bool:
+    """Whether a rod is as long, as wide and as well seen as in another frame.
+
+    What comes across it hides its edges, and what touches its tip moves that: with
+    nothing of this, all lies around the rod as it did.
+    """
+    length = abs(result.length_mm - last.length_mm)
+    width = abs(result.width_mm - last.width_mm)
+    seen = float(result.points["good"].mean() - last.points["good"].mean())
+    return (
+        length < SAME_SD * result.length_sd_mm
+        and width < SAME_SD * result.width_sd_mm
+        and seen > -LESS_SEEN
+    )
+
+
 def doubts(
     result: Measurement,
     photo: Photo,
-    strip: Strip,
+    around: set[str],
     refined: Refined,
     candidate: Candidate,
     setting: Setting,
 ) -> Measurement:
-    """Return the measurement with its flags."""
+    """Return the measurement with its flags, beside those of what lies around it."""
     flags = list(result.flags)
     if setting.calibration is None:
         flags.append("uncalibrated")
@@ -120,20 +161,16 @@ def doubts(
         flags.append("clamp_at_border")
     if candidate.root == "free":
         flags.append("no_clamp")
-    after_gap = not refined.rough and goes_on_after_gap(strip, refined)
-    crossed = candidate.told and crossed_at(strip, refined) is not None
-    if candidate.rivalled or after_gap or crossed:
+    if OTHER_ROD in around:
         flags.append(OTHER_ROD)
     # By a tag the place may be known all the same.
     if root_hidden(refined, setting) and result.clamp_sd_mm > 0.5 * HIDDEN_MM:
         flags.append("root_hidden")
     pull = quantile(refined.shaded[refined.good], 0.9)
-    face_px = setting.face_px(refined.fit.curve)
-    if candidate.root == "clamp" and (
-        _front_in_shade(refined, pull) or _goes_on(strip, refined, face_px)
-    ):
-        flags.append("clamp_doubtful")
-    if not refined.rough and tip_goes_on(photo, strip, refined):
+    unclear = candidate.root == "clamp" and _front_in_shade(refined, pull)
+    if unclear or CLAMP_DOUBTFUL in around:
+        flags.append(CLAMP_DOUBTFUL)
+    if TIP_GOES_ON in around:
         flags.append(TIP_GOES_ON)
     if direction_is_doubtful(result.clamp_angle_sd_deg, result.length_mm):
         flags.append("direction_doubtful")

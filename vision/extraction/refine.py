@@ -79,6 +79,8 @@ class Refined:
     saturated : float
         Part of it beside which the paper is white, as far as the picture can tell; or
         where it is white itself.
+    joints : ndarray or None
+        Arc lengths of its joints; None where none were sought.
     whole : bool
         Whether edges that are cut off there were moved to half of all the light.
     settled : bool
@@ -95,6 +97,7 @@ class Refined:
     rough: bool
     blur: float
     saturated: float
+    joints: Array | None = None
     whole: bool = False
     settled: bool = True
 
@@ -114,6 +117,7 @@ def refine(
     walls: Walls | None = None,
     face_px: float = 0.0,
     sd_px: float = np.inf,
+    known_joints: Array | None = None,
     plain: Image | None = None,
 ) -> Refined:
     """Measure axis, edges and ends.
@@ -138,6 +142,8 @@ def refine(
         How much of a clamp's face the camera may see, along the rod.
     sd_px : float
         Standard deviation of the start where it tells the ends too, as in a film.
+    known_joints : ndarray, optional
+        Arc lengths in px, from the root, of joints that were found before.
     plain : ndarray, shape (height, width), float32, optional
         The picture's own light where `grey` is a mix of its colours: what a clamp that
         has no colour is seen in.
@@ -168,7 +174,9 @@ def refine(
             seen = to_wall_ends(state, seen, walls)
         if held and not seeking:
             seen = to_whole_edges(grey, state, seen, walls, sign, anew=aside > _KEPT_PX)
-        known = None if places is None or aside > _KEPT_PX else places - first
+        known = known_joints
+        if known is None and places is not None and aside <= _KEPT_PX:
+            known = places - first
         fit, used, aside, places = _fit(
             state, seen, first, end, joints, known, seeking=seeking,
             clamped=root == "clamp",
@@ -194,7 +202,7 @@ def refine(
         fit=replace(fit, curve=curve), shaded=shaded, good=used, width=width,
         sigma_width=sigma_width, tip=replace(tip, s=tip.s - first),
         clamp=None if lines is None else lines.shifted(first), rough=state.rough,
-        blur=state.blur,
+        blur=state.blur, joints=None if places is None else places - first,
         saturated=white, whole=held and white > SOME, settled=settled,
     )  # fmt: skip
 
