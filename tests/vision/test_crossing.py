@@ -34,10 +34,11 @@ def across(x_mm: float, y_mm: float, angle_deg: float) -> Rod:
     return Rod(line=line, pose=pose)
 
 
-def test_a_second_rod_across_is_named_and_not_measured():
+def test_a_rod_is_measured_under_a_second_one_across_it_and_in_doubt():
     found = found_under(across(14.0, 6.5, 0.0))
-    assert found.flags == ("touches_object",)
-    assert "crosses or touches it" in found.reason
+    assert found.ok, found.reason
+    assert "other_rod" in found.flags
+    assert found.length_mm == pytest.approx(28.0, abs=0.05)
 
 
 def test_a_second_rod_close_by_is_no_crossing():

@@ -148,13 +148,23 @@ def bar(at, angle_deg, length, width):
     return at + corners @ np.array([length * along, width * aside])
 
 
+def is_measured(photo, turn_deg, doubt="other_rod"):
+    found = extract(photo, SCALE, rod_height_mm=0.0)
+    assert found.ok, found.reason
+    assert doubt in {*found.flags, ""}
+    truth, _ = axis(turn_deg)
+    away = [np.hypot(*(truth - point).T).min() for point in found.points_px[:-1]]
+    assert max(away) < 1.0
+    assert abs(found.length_mm - 20.0) < 0.08
+
+
 @pytest.mark.parametrize("clamp", [0.3, 0.42])
 def test_a_bar_over_a_rod_is_not_its_clamp(clamp):
     points, theta = axis(45.0)
     across = np.degrees(theta[150]) + 65.0
     over = ((0.05,) * 3, bar(points[150], across, 200, 30))
     photo = drawn(rod=RED, turn_deg=45.0, clamp=clamp, over=[over])
-    assert not extract(photo, SCALE, rod_height_mm=0.0).ok
+    is_measured(photo, 45.0)
 
 
 def test_a_wire_that_crosses_a_rod_does_not_grow_from_it():
@@ -162,7 +172,34 @@ def test_a_wire_that_crosses_a_rod_does_not_grow_from_it():
     across = np.degrees(theta[316]) + 60.0
     over = ((0.14,) * 3, bar(points[316], across, 420, 12.4))
     photo = drawn(rod=GREEN, turn_deg=-100.0, over=[over])
-    assert not extract(photo, SCALE, rod_height_mm=0.0).ok
+    found = extract(photo, SCALE, rod_height_mm=0.0)
+    assert not found.ok  # it leaves the picture
+
+
+@pytest.mark.parametrize("wide", [4, 8, 20, 44])
+@pytest.mark.parametrize("above", [True, False])
+@pytest.mark.parametrize("aslant_deg", [50, -80])
+def test_a_rod_goes_on_across_a_bar(wide, above, aslant_deg):
+    points, theta = axis(60.0)
+    across = bar(points[220], np.degrees(theta[220]) + aslant_deg, 240, wide)
+    over = [((0.03,) * 3, across)]
+    if not above:
+        over.append((RED, strip(60.0, -0.5, 0.5)))
+    photo = drawn(rod=RED, turn_deg=60.0, over=over)
+    is_measured(photo, 60.0, "other_rod" if wide >= 0.5 * WIDTH else "")
+
+
+def test_a_bar_as_wide_and_as_dark_is_not_taken_for_the_rod_it_crosses():
+    points, theta = axis(80.0)
+    over = (BLACK, bar(points[200], np.degrees(theta[200]) + 35.0, 380, WIDTH))
+    is_measured(drawn(rod=BLACK, turn_deg=80.0, over=[over]), 80.0)
+
+
+def test_a_rod_that_ends_at_a_bar_is_refused():
+    points, theta = axis(30.0)
+    over = (BLACK, bar(points[-1], np.degrees(theta[-1]) + 90.0, 200, WIDTH))
+    found = extract(drawn(rod=BLACK, turn_deg=30.0, over=[over]), SCALE)
+    assert "touches_object" in found.flags
 
 
 @pytest.mark.parametrize(

@@ -146,13 +146,13 @@ def test_a_specimen_tells_its_rod_from_another_in_a_clamp():
     assert found.length_mm == pytest.approx(26.0, abs=0.1)
 
 
-@pytest.mark.parametrize(
-    ("angle_deg", "x_mm", "y_mm"), [(100, 4, -14), (150, 14, -8), (60, -2, -12)]
-)
-def test_a_rod_that_crosses_another_is_refused(angle_deg, x_mm, y_mm):
+@pytest.mark.parametrize(("angle_deg", "x_mm", "y_mm"), [(100, 4, -14), (150, 14, -8)])
+def test_a_rod_that_crosses_another_is_in_doubt(angle_deg, x_mm, y_mm):
     found = measured(replace(PLAIN, others=(lying(angle_deg, x_mm, y_mm, 24.0),)))
-    assert not found.ok
-    assert not found.points
+    assert found.ok, found.reason
+    assert "other_rod" in found.flags
+    assert off(found) < 0.08
+    assert found.length_mm == pytest.approx(LINE.length_mm, abs=0.08)
 
 
 def test_a_rod_that_leaves_the_picture_is_refused():

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from magbend.vision.find.rod import Candidate
+from magbend.vision.find.candidate import Candidate
 from magbend.vision.find.shadeless import without_shade
 from magbend.vision.picture.photo import as_photo
 

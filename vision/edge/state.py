@@ -43,6 +43,7 @@ class State:
     The blur of the ends, along the rod, is 0 as long as none was fitted; `blurs` is
     that of parts of its sides where it is uneven, as motion makes it on a bent rod.
     `plain` is the picture's own light where the rod is seen in a mix of colours.
+    At the places `hidden` (x, y, radius) something lies across it.
     """
 
     curve: Curve
@@ -53,6 +54,7 @@ class State:
     face_px: float
     rough: bool
     blur: float = 1.0
+    hidden: Array | None = None
     scatter: float = 0.0
     fuzz: float = 0.0
     blurs: Array | None = None

@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..curve.robust import median
-from .refine import Refined
+from .refine import Refined, covered
 from .strip import GRID, Strip
+
+Array = NDArray[np.float64]
 
 _CLAMP, _ASIDE = 3.0, 0.875
 """Nearer to the clamp its own sides may be beside the rod; and how far from the axis
@@ -28,25 +30,39 @@ _BARE, _RIM = 0.6, 0.375
 are looked for, which is lighter than paper in the middle, in widths from the axis."""
 
 
-def crossed_at(strip: Strip, refined: Refined) -> float | None:
-    """Return the arc length in px where another thing meets the rod; None for none."""
+def crossings(strip: Strip, refined: Refined, known_px: Array) -> Array:
+    """Return the places where another thing meets the rod, but not those known.
+
+    Returns
+    -------
+    ndarray, shape (k, 3)
+        Middle (x, y) and radius, px.
+    """
     left, right = strip.lanes(-_ASIDE, _ASIDE)
     limit = _level(strip, refined, _DARK)
     clear = (strip.s > _CLAMP * strip.width) & (strip.s <= refined.fit.curve.s[-1])
+    found = []
     for side in (left, right):
         for first, after in _runs((side < limit) & clear):
-            if _THICK < (after - first) / GRID < _LONG:
-                return float(strip.s[(first + after) // 2])
-    return None
+            points = strip.points[first:after]
+            wide = (after - first) / GRID
+            if _THICK < wide < _LONG and not covered(points, known_px).any():
+                radius = 0.5 * (wide + 1.0) * strip.width
+                found.append([*points[len(points) // 2], radius])
+    return np.reshape(found, (-1, 3))
 
 
-def over_paper(strip: Strip, refined: Refined) -> float:
-    """Return how many widths the axis runs over paper at a stretch, without edges."""
+def over_paper(strip: Strip, refined: Refined, known_px: Array) -> float:
+    """Return how many widths the axis runs over paper at a stretch, without edges.
+
+    Not at places where something else is known to lie across it.
+    """
     if refined.good.all():
         return 0.0
     rims = strip.lanes(-_RIM, 0.0, _RIM).min(axis=0)
     along = (strip.s >= 0.0) & (strip.s <= refined.fit.curve.s[-1])
     bare = along & ~_edged(strip, refined) & (rims > _level(strip, refined, _BARE))
+    bare &= ~covered(strip.points, known_px)
     return max((float(after - first) / GRID for first, after in _runs(bare)), default=0)
 
 

@@ -16,15 +16,16 @@ from ..camera.find_tag import TaggedClamp, tagged_clamp
 from ..camera.oriented import oriented
 from ..curve.curve import Curve
 from ..edge.state import LostError
+from ..find.candidate import Candidate
 from ..find.choose import find_rod, search_rod
 from ..find.coloured import shows_another
 from ..find.ground import View
-from ..find.rod import Candidate
 from ..find.shadeless import without_shade
 from ..find.track import Start, start_curve
 from ..measurement import Measurement, Pose, failure
 from ..picture.photo import Photo
 from .bare import flattened
+from .crossing import crossings
 from .quality import (
     AROUND,
     OTHER_COLOUR,
@@ -244,6 +245,12 @@ def finish(
         around = AROUND & set(last.flags)
     else:
         strip = along_rod(view, refined)
+        across = crossings(strip, refined, candidate.hidden_px)
+        if len(across) and not refined.rough:
+            hidden = np.vstack([candidate.hidden_px, across])
+            candidate = replace(candidate, hidden_px=hidden)
+            refined = _refined(photo, view, start, candidate, setting, sd_px, joints)
+            strip, result = along_rod(view, refined), None
         refusal(photo, view, strip, refined, candidate)
         around = doubts_around(photo, strip, refined, candidate, setting)
     if result is None:
@@ -277,6 +284,7 @@ def _refined(
             joints=setting.joints_px, walls=setting.walls_px if walls else None,
             face_px=setting.face_px(start.curve), sd_px=sd_px,
             known_joints=joints, plain=None if view.mix is None else photo.grey,
+            hidden_px=candidate.hidden_px,
         )  # fmt: skip
 
     least = 0.0 if start.rough else COLLAPSED * start.width

@@ -18,8 +18,8 @@ from ...core.errors import MagbendError
 from ..camera.oriented import oriented
 from ..curve.curve import Curve
 from ..edge.state import LostError, Root
+from ..find.candidate import Candidate
 from ..find.ground import View, mixed
-from ..find.rod import Candidate
 from ..find.track import Start, start_curve
 from ..measurement import Measurement
 from ..picture.photo import Photo

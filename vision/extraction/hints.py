@@ -19,8 +19,8 @@ from ...core.errors import InputError, MagbendError
 from ..camera.calibrate import calibrate_known_length
 from ..camera.oriented import oriented
 from ..edge.state import LostError, Root
+from ..find.candidate import Candidate
 from ..find.ground import best_view
-from ..find.rod import Candidate
 from ..measurement import Measurement, failure
 from ..picture.photo import Photo
 from ..picture.turn import turned_points
@@ -147,7 +147,7 @@ def _between(photo: Photo, setting: Setting, points: Array) -> Measurement:
         width = max(3.0, share * length)
         rod = Candidate(
             points_px=path, width_px=width, length_px=length, root=root,
-            contacts=1, ratio=0.0, told=True,
+            contacts=1, ratio=0.0,
         )  # fmt: skip
         view = best_view(photo, path, width)
         try:

@@ -13,13 +13,13 @@ from ..edge.clamp import is_dark_line
 from ..edge.edges import clear_of
 from ..edge.state import LostError
 from ..edge.white import SOME
+from ..find.candidate import Candidate
 from ..find.ground import View
-from ..find.rod import Candidate
 from ..find.rod_colour import ALIKE, distance_from
 from ..measurement import Measurement
 from ..picture.photo import Photo
 from .beyond_ends import check_ends, goes_on_after_gap, tip_goes_on
-from .crossing import crossed_at, over_paper
+from .crossing import over_paper
 from .deviations import scale_sd
 from .refine import Refined
 from .root import HIDDEN_MM, root_hidden
@@ -91,19 +91,12 @@ def refusal(
     if refined.fit.noise > 0.25 * width:
         raise LostError("inconsistent", "the edges of the rod lie on no smooth curve")
     bare = OVER_PAPER_ROUGH if refined.rough else OVER_PAPER
-    if over_paper(strip, refined) > bare:
+    if over_paper(strip, refined, candidate.hidden_px) > bare:
         raise LostError(
             "inconsistent",
             "the axis runs over bare paper for a while: two things may cross there",
         )
     check_ends(photo, view, strip, refined)
-    at = None if refined.rough else crossed_at(strip, refined)
-    if at is not None and not candidate.told:
-        raise LostError(
-            "touches_object",
-            "something as dark as the rod crosses or touches it, at "
-            f"{100.0 * at / length:.0f} % of its length: take it away",
-        )
     if length < 5.0 * width:
         raise LostError("no_rod", "what looks like a rod is shorter than five widths")
 
@@ -114,8 +107,7 @@ def doubts_around(
     """Return the doubts for what lies around a rod."""
     found = set()
     after_gap = not refined.rough and goes_on_after_gap(strip, refined)
-    crossed = candidate.told and crossed_at(strip, refined) is not None
-    if candidate.rivalled or after_gap or crossed:
+    if candidate.rivalled or after_gap or len(candidate.hidden_px):
         found.add(OTHER_ROD)
     face_px = setting.face_px(refined.fit.curve)
     if candidate.root == "clamp" and _goes_on(strip, refined, face_px):
@@ -138,6 +130,7 @@ def is_as_before(result: Measurement, last: Measurement) -> bool:
         length < SAME_SD * result.length_sd_mm
         and width < SAME_SD * result.width_sd_mm
         and seen > -LESS_SEEN
+        and OTHER_ROD not in last.flags
     )
 
 

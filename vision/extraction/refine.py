@@ -119,6 +119,7 @@ def refine(
     sd_px: float = np.inf,
     known_joints: Array | None = None,
     plain: Image | None = None,
+    hidden_px: Array | None = None,
 ) -> Refined:
     """Measure axis, edges and ends.
 
@@ -147,6 +148,8 @@ def refine(
     plain : ndarray, shape (height, width), float32, optional
         The picture's own light where `grey` is a mix of its colours: what a clamp that
         has no colour is seen in.
+    hidden_px : ndarray, shape (k, 3), optional
+        Places (x, y, radius) where something lies across the rod.
 
     Raises
     ------
@@ -157,7 +160,7 @@ def refine(
     last = float(start.curve.s[-1])
     state = State(
         start.curve, half, start.width, 0.0, last, face_px, start.rough, start.blur,
-        plain=plain,
+        hidden=hidden_px, plain=plain,
     )  # fmt: skip
     seeking = sd_px > _SURE_PX
     seen = _look(grey, state, sign, 0, seeking=seeking)
@@ -233,7 +236,9 @@ def _look(grey: Image, state: State, sign: float, turn: int, *, seeking: bool) -
         for part, blur in zip(slices(len(s), len(blurs)), blurs, strict=True)
     ])  # fmt: skip
     good = edges.usable(least=FLARED * width if state.rough else 0.6)
-    if good.sum() < max(8.0, 0.4 * len(good)):
+    bare = ~covered(points, state.hidden)
+    good &= bare
+    if good.sum() < max(8.0, 0.4 * bare.sum()):
         raise LostError(
             "edges_lost",
             "less than half of the rod has two edges that can be told from the paper: "
@@ -247,6 +252,14 @@ def _look(grey: Image, state: State, sign: float, turn: int, *, seeking: bool) -
         state.blurs = local if np.ptp(local) > _UNEVEN * state.blur else None
     state.scatter = _scatter(edges, int(5.0 / step))
     return Seen(s, theta, edges, good)
+
+
+def covered(points: Array, places: Array | None) -> NDArray[np.bool_]:
+    """Return which points lie within places (x, y, radius)."""
+    inside = np.zeros(len(points), np.bool_)
+    for x, y, radius in () if places is None else places:
+        inside |= np.hypot(points[:, 0] - x, points[:, 1] - y) < radius
+    return inside
 
 
 def _scatter(edges: Edges, lag: int) -> float:

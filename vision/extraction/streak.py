@@ -19,8 +19,8 @@ from ..curve.robust import median, quantile
 from ..edge.flank import median_profiles
 from ..edge.highlight import fit_bars
 from ..edge.step_line import lanes
+from ..find.candidate import Candidate
 from ..find.ground import View
-from ..find.rod import Candidate
 from ..find.track import smooth_curve, start_curve
 from .matt import Streak, matt
 from .strip import Strip, profiles

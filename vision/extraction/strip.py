@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..edge.step_line import sample_lanes
+from ..find.candidate import Candidate
 from ..find.ground import View
-from ..find.rod import Candidate
 from ..find.track import resample
 from .refine import Refined
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..curve.robust import median
 from ..edge.edges import clear_of
-from ..find.rod import Candidate
+from ..find.candidate import Candidate
 from .strip import PARTS, Strip, profiles
 
 Array = NDArray[np.float64]

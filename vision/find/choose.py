@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from ..edge.state import LostError
 from ..picture.photo import Photo
 from .binarise import Binary, binarise, rebinarise
+from .candidate import Candidate
 from .ground import FAINT, LEVELS, View, best_view, ground_distance
-from .rod import LEAST_SHARE, Candidate, find_candidates
+from .rod import LEAST_SHARE, find_candidates
 from .rod_colour import ALIKE, distance_from
 from .things import Thing, find_things
 
@@ -148,11 +149,15 @@ def search_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
     if not things:
         raise LostError("no_rod", "nothing in the picture is long and thin like a rod")
     seen = [thing.best.points_px for thing in things[:_SHOWN]]
-    first = next(
+    own = [
         thing
         for thing in things
         if not any(_is_shade(thing.best, other.best) for other in things)
-    )
+    ]
+    held = [thing for thing in own if thing.best.root != "free"]
+    first = own[0]
+    if held and sought.clamp != "none" and held[0].worth > _AS_CLEAR * first.worth:
+        first = held[0]
     first = min(
         [first, *_all_rivals(first, things)], key=lambda item: sought.misfit(item.best)
     )

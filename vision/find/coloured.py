@@ -12,7 +12,8 @@ import numpy as np
 
 from ..picture.photo import Photo
 from .binarise import Binary
-from .rod import Candidate, find_candidates
+from .candidate import Candidate
+from .rod import find_candidates
 
 _GLANCE_PX = 400
 """The longer side of the picture looked at, roughly: enough to see that something is

@@ -8,18 +8,16 @@ rod's pixels, and the centres of its level sets are the start curve.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.jit import njit
-from ..curve.robust import median
-from ..edge.state import Root
+from .across import joined, leads_to
 from .binarise import Binary
+from .candidate import Candidate
 from .discs import near_core
-from .level_sets import level_sets
+from .trace import traced
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
@@ -36,66 +34,14 @@ _FINE = 3.0
 _HAIR = 0.35
 """Width of what grows from the tip of a rod in a clamp, over the rod's, if a hair."""
 
+_ASLANT = 2.5
+"""Widths of a rod that hide a wire beneath it, at most."""
+
 _BIN, _HALVED = 0.09, 8
 """Width of a bin of log width, and bins from one width to half of it."""
 
 _GRAIN = 1.5
 """Half width under which a thing may be noise."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Candidate:
-    """Something long and thin, in pixels of the photograph.
-
-    Parameters
-    ----------
-    points_px : ndarray, shape (n, 2)
-        Start curve (x, y) from root to tip.
-    width_px, length_px : float
-        Rough width and length.
-    root : {"clamp", "border", "free"}
-        What it grows from.
-    contacts : int
-        Separate places where it touches something fat or the border.
-    leaves : bool
-        Whether one of them, besides its root, is the border of the picture.
-    ratio : float
-        Light on it relative to the background.
-    rivalled : bool
-        Whether another thing in the picture may be the rod as well.
-    halved : bool
-        Whether another thing lies so close along it that both may be one rod.
-    told : bool
-        Whether a person gave its ends.
-    off_colour : float
-        Distance of its colour from the rod's, CIELAB; 0 where that is not known.
-    """
-
-    points_px: Array
-    width_px: float
-    length_px: float
-    root: Root
-    contacts: int
-    ratio: float
-    leaves: bool = False
-    rivalled: bool = False
-    halved: bool = False
-    told: bool = False
-    off_colour: float = 0.0
-
-    @property
-    def slenderness(self) -> float:
-        """Length over width."""
-        return self.length_px / self.width_px
-
-    def away(self, point: Array) -> float:
-        """Distance of a point (x, y) from the start curve, px."""
-        return float(np.hypot(*(self.points_px - point).T).min())
-
-    def lies_on(self, other: Candidate) -> bool:
-        """Whether its middle lies on another: a part of it, or the same thing."""
-        middle = self.points_px[len(self.points_px) // 2]
-        return other.away(middle) < max(self.width_px, other.width_px)
 
 
 def find_candidates(binary: Binary) -> list[Candidate]:
@@ -127,6 +73,7 @@ def find_candidates(binary: Binary) -> list[Candidate]:
             continue
         roi = _fill(contours, links, index, (x, y, w, h))
         found.extend(_thin_parts(roi, (x, y), binary))
+    found = joined(found, binary)
     found.sort(key=lambda item: -item.length_px)
     return found
 
@@ -168,6 +115,8 @@ def _thin_parts(roi: Mask, origin: tuple[int, int], binary: Binary) -> list[Cand
         found = of_width(common)
     if common < _FINE:
         found = _without_hairs(found, of_width(thicker))
+    elif len(found) > 1:
+        found = _without_wires(found, of_width(thicker))
     # A bar that reaches far into the picture is long and thin itself, but the clamp of
     # a thinner one that grows from its end.
     longest = max((item.length_px for item in found), default=0.0)
@@ -195,6 +144,26 @@ def _without_hairs(found: list[Candidate], thicker: list[Candidate]) -> list[Can
         *(item for item in found if not any(_touches(item, rod) for rod in rods)),
         *rods,
     ]
+
+
+def _without_wires(found: list[Candidate], thicker: list[Candidate]) -> list[Candidate]:
+    """Leave out what crosses a thicker rod: it goes on at the other side of that."""
+    for rod in thicker:
+        beside = [item for item in found if _touches(item, rod)]
+        wires = [
+            item
+            for item in beside
+            if any(
+                leads_to(item.points_px[::-1], other.points_px, _ASLANT * rod.width_px)
+                for other in beside
+            )
+        ]
+        if wires:
+            found = [
+                rod,
+                *(item for item in found if not any(item is wire for wire in wires)),
+            ]
+    return found
 
 
 def _from_end(one: Candidate, other: Candidate) -> bool:
@@ -238,10 +207,10 @@ def _of_width(
         cv2.drawContours(piece, [part], 0, 1, cv2.FILLED, offset=(-x0, -y0))
         piece &= thin[window]
         place = (origin[0] - 1 + x0, origin[1] - 1 + y0)
-        candidate = _trace(piece, fat[window], place, half, binary)
-        if candidate is not None:
-            found.append(candidate)
-    return found
+        found.extend(traced(piece, fat[window], place, half, binary))
+    return [
+        item for item in joined(found, binary) if item.slenderness > LEAST_SLENDERNESS
+    ]
 
 
 def _edge_distance(
@@ -314,73 +283,3 @@ def _ridge(depth: NDArray[np.float32]) -> NDArray[np.float32]:
                 found[count] = row[j]
                 count += 1
     return found[:count]
-
-
-def _trace(
-    piece: Mask,
-    fat: Mask,
-    place: tuple[int, int],
-    half: float,
-    binary: Binary,
-) -> Candidate | None:
-    if cv2.countNonZero(piece) < 4.0 * LEAST_SLENDERNESS * half * half:
-        return None
-    touching, contacts = _contact(piece & _grown(fat))
-    at_border, border_contacts = _contact(piece & _border(piece.shape, place, binary))
-    root: Root = "free"
-    seeds = None
-    if contacts:
-        root, seeds = "clamp", touching
-    elif border_contacts:
-        root, seeds = "border", at_border
-    curve = level_sets(piece, seeds, half)
-    if curve is None:
-        return None
-    steps = np.hypot(*np.diff(curve, axis=0).T)
-    length = float(steps.sum()) + (2.0 if root == "free" else 1.0) * half
-    width = max(2.0 * half, 1.0)
-    if length < LEAST_SLENDERNESS * width:
-        return None
-    x, y = np.rint(curve + place).astype(int).T
-    f = binary.factor
-    return Candidate(
-        points_px=(curve + place + 0.5) * f - 0.5,
-        width_px=width * f,
-        length_px=length * f,
-        root=root,
-        contacts=contacts + border_contacts,
-        leaves=border_contacts > (root == "border"),
-        ratio=median(binary.ratio[y, x]),
-    )
-
-
-def _contact(both: Mask) -> tuple[Mask, int]:
-    """Return the pixels of one place where two masks meet, and how many there are."""
-    x, y, w, h = cv2.boundingRect(both)
-    if w == 0:
-        return both, 0
-    # Far fewer pixels than the whole, and a frame for them to grow into.
-    box = (slice(y, y + h), slice(x, x + w))
-    small = np.zeros((h + 4, w + 4), np.uint8)
-    small[2:-2, 2:-2] = both[box]
-    count, labels = cv2.connectedComponents(_grown(small))
-    first = np.zeros_like(both)
-    first[box] = both[box] & (labels[2:-2, 2:-2] == 1)
-    return first, count - 1
-
-
-def _grown(mask: Mask) -> Mask:
-    """Grow a mask by two pixels."""
-    return np.asarray(cv2.dilate(mask, np.ones((5, 5), np.uint8)), dtype=np.uint8)
-
-
-def _border(shape: tuple[int, ...], place: tuple[int, int], binary: Binary) -> Mask:
-    """Mark the outermost pixels of the picture inside a window."""
-    height, width = binary.mask.shape
-    x, y = place
-    inside = np.zeros(shape, np.uint8)
-    inside[: max(1 - y, 0)] = 1
-    inside[max(height - 1 - y, 0) :] = 1
-    inside[:, : max(1 - x, 0)] = 1
-    inside[:, max(width - 1 - x, 0) :] = 1
-    return inside

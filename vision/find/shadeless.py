@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from ..curve.robust import median
 from ..picture.photo import Photo
+from .candidate import Candidate
 from .ground import View, mixed
-from .rod import Candidate
 from .track import resample
 
 Array = NDArray[np.float64]

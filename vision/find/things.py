@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .binarise import Binary, rebinarise
-from .rod import Candidate, find_candidates
+from .candidate import Candidate
+from .rod import find_candidates
 
 _RANK = {"clamp": 2, "border": 1, "free": 0}
 _ALIKE_WIDTH, _ALIKE_LENGTH = 1.7, 0.6
@@ -94,21 +95,28 @@ def _joined(things: list[Thing]) -> list[Thing]:
     """Lay what floats free at strict levels to its outer part that a clamp holds.
 
     Where deep shade joins rod and clamp, at the levels that show the clamp only the
-    part outside the shade is thin.
+    part outside the shade is thin. But what has two such parts, one to either end, is
+    held by neither: there it lies across something.
     """
     left = list(things)
     for free in things:
         whole = free.best
         if whole.root != "free":
             continue
-        for thing in things:
-            part = thing.best
-            if part.root != "clamp" or not _is_outer_part(part, whole):
-                continue
-            held = [_held(item, part.points_px[-1]) for item in free.seen]
-            thing.seen[:0] = held
-            left.remove(free)
-            break
+        outer = [
+            thing
+            for thing in things
+            if thing.best.root == "clamp" and _is_outer_part(thing.best, whole)
+        ]
+        if not outer:
+            continue
+        tips = [thing.best.points_px[-1] for thing in outer]
+        if any(np.hypot(*(tip - tips[0])) > 0.5 * whole.length_px for tip in tips):
+            left = [thing for thing in left if thing not in outer]
+            continue
+        held = [_held(item, tips[0]) for item in free.seen]
+        outer[0].seen[:0] = held
+        left.remove(free)
     return left
 
 

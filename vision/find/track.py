@@ -201,7 +201,7 @@ def _carry_on(
     """
     seen, unseen, again, light = head, 0, 0, level - dark
     while head > 0 and len(path) - head >= 4 and unseen <= _UNSEEN:
-        x, y, u, v = _predict(path[head : head + _RECENT], step)
+        x, y, u, v = predict(path[head : head + _RECENT], step)
         beside = 0.5 * width + 2.0 + 2.0 * blur
         shade = min(
             sign * _streak(grey, x - beside * v, y + beside * u, u, v),
@@ -260,7 +260,7 @@ def _streak(grey: Image, x: float, y: float, u: float, v: float) -> float:
 
 
 @njit(cache=True)
-def _predict(recent: Array, step: float) -> tuple[float, float, float, float]:
+def predict(recent: Array, step: float) -> tuple[float, float, float, float]:
     """Return the next point before the first and the unit direction root to tip."""
     count = len(recent)
     along = np.zeros(count)
