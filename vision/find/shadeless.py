@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,13 +44,17 @@ _DEEPEST, _COPY, _SHIFT = 0.1, 0.3, 0.05
 shade may wander from where its rod must be, in widths; and the part of a shift that
 must be seen across a rod, for what lies along it is not."""
 
-_MISSING, _MISSING_PX = 0.03, 0.7
+_MISSING, _MISSING_PX, _UNEVEN = 0.03, 0.7, 0.06
 """Light of the paper that is missing beside a rod where it has a shade: as that of so
-many widths of bare paper, and of so many px."""
+many widths of bare paper, and of so many px; what is less of a pixel's is uneven light.
+"""
 
 _DARKER, _AS_SHARP = 0.5, 0.92
 """Light of a rod over that in its shade by which lightness tells them too; and how
 sharp its colour must be then, over that."""
+
+_ALIKE = 9
+"""Stations that see about the same of a shade."""
 
 _NOISE, _DEPTH = 0.003, 0.1
 """Least noise of the light of a pixel; and what a shade takes of it."""
@@ -167,8 +172,9 @@ def _missing_px(share: Array, tint: Array) -> float:
     """
     paper = np.quantile(share, 0.85, axis=1, keepdims=True)
     rod = median((share / paper)[tint > 0.8])
-    missing = 1.0 - (1.0 - rod) * tint - share / paper
-    return float(np.quantile(np.sum(missing * (tint < 0.5), axis=1), 0.7))
+    missing = cv2.blur(1.0 - (1.0 - rod) * tint - share / paper, (1, _ALIKE))
+    shaded = (missing > _UNEVEN) & (tint < 0.5)
+    return float(np.quantile(np.sum(missing * shaded, axis=1), 0.7))
 
 
 def _is_coarse(share: Array, tint: Array, middle: Array, width: float) -> bool:
