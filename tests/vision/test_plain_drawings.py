@@ -113,6 +113,15 @@ def test_a_colour_tells_a_rod_from_a_shade_that_is_as_dark_or_darker(rod):
     assert found.length_mm == pytest.approx(20.0, abs=0.06)
 
 
+@pytest.mark.parametrize("rod", [RED, GREEN])
+def test_a_rod_is_as_wide_in_any_colour(rod):
+    """Grey values made before the light was linear: 0.3 px off where colours mix."""
+    black, coloured = (
+        measured(rod=each, turn_deg=30.0, blur_px=1.5).width_px for each in (BLACK, rod)
+    )
+    assert coloured == pytest.approx(black, abs=0.06)
+
+
 def test_it_tells_a_clamps_front_from_a_shade_that_blur_makes_one_with_it():
     found = measured(rod=RED, turn_deg=9.0, shade_px=(4, 12), deep=0.5, blur_px=3.2)
     assert abs(found.clamp_px[0] - ROOT[0]) < 1.5

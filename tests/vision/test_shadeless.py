@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from magbend.vision.find.candidate import Candidate
-from magbend.vision.find.shadeless import without_shade
+from magbend.vision.find.ground import LUMINANCE, View
+from magbend.vision.find.shadeless import in_its_colour
 from magbend.vision.picture.photo import as_photo
 
 TAN, RED, BLACK = (0.26, 0.43, 0.58), (0.04, 0.04, 0.45), (0.03, 0.03, 0.03)
@@ -50,11 +51,17 @@ def candidate(aside):
     )  # fmt: skip
 
 
+def seen(photo, aside=0.0):
+    """Return a rod and its light, as told from a candidate beside it."""
+    plain = View(grey=photo.grey, sign=1.0)
+    return in_its_colour(photo, candidate(aside), plain)
+
+
 @pytest.mark.parametrize("aside", [14.0, 45.0])
 def test_paper_and_shade_are_equally_light_and_the_rod_is_not(aside):
     """Found was the shade, which is darker than the rod; what is left of it is blue."""
     photo = drawn(TAN, kept=(0.33, 0.3, 0.29), aside=aside)
-    rod, view = without_shade(photo, candidate(aside))
+    rod, view = seen(photo, aside)
     middle = np.interp(X, *rod.points_px.T)
     assert abs(middle - bent(0.0)[:, 1])[20:-20].max() < 1.5
     assert rod.width_px == pytest.approx(WIDTH, abs=1.5)
@@ -67,23 +74,20 @@ def test_paper_and_shade_are_equally_light_and_the_rod_is_not(aside):
 
 
 @pytest.mark.parametrize(
-    ("rod", "kept", "aside"),
-    [(TAN, (1.0, 1.0, 1.0), 14.0), (BLACK, (0.4, 0.4, 0.4), 14.0)],
+    ("rod", "kept", "mix"), [(TAN, 1.0, LUMINANCE), (BLACK, 0.4, None)]
 )
-def test_without_a_shade_or_a_colour_there_is_nothing_to_discount(rod, kept, aside):
-    photo = drawn(rod, kept=kept, aside=aside)
-    assert without_shade(photo, candidate(0.0)) is None
+def test_without_a_shade_or_a_colour_there_is_nothing_to_discount(rod, kept, mix):
+    photo = drawn(rod, kept=(kept,) * 3, aside=14.0)
+    assert seen(photo)[1].mix == mix
 
 
 def test_what_is_no_copy_of_a_rod_is_not_taken_for_it():
     wire = RED, bent(48.0, bend=-10.0)
     photo = drawn((0.2, 0.2, 0.2), kept=(0.5, 0.5, 0.5), aside=16.0, other=wire)
-    assert without_shade(photo, candidate(0.0)) is None
+    assert seen(photo)[1].mix is None
 
 
-def test_where_colours_are_coarse_a_dark_rod_is_seen_in_its_own_light():
+def test_where_colours_are_coarse_a_dark_rod_is_seen_by_its_lightness():
     deep = {"kept": (0.4, 0.4, 0.4), "aside": 14.0}
-    sharp = without_shade(drawn(RED, **deep), candidate(0.0))
-    coarse = without_shade(drawn(RED, coarse=True, **deep), candidate(0.0))
-    assert sharp[1].mix is not None
-    assert coarse[1].mix is None
+    assert not seen(drawn(RED, **deep))[1].plain
+    assert seen(drawn(RED, coarse=True, **deep))[1].mix == LUMINANCE

@@ -43,7 +43,7 @@ is left lies 0.43 blurs off."""
 
 def is_dark(seen_in: View) -> bool:
     """Whether a rod is seen dark in plain light, so that its faces' light is known."""
-    return seen_in.sign > 0.0 and seen_in.mix is None
+    return seen_in.sign > 0.0 and seen_in.plain
 
 
 def side_face(seen_in: View) -> float:

@@ -20,7 +20,7 @@ from ..find.candidate import Candidate
 from ..find.choose import find_rod, search_rod
 from ..find.coloured import shows_another
 from ..find.ground import View
-from ..find.shadeless import without_shade
+from ..find.shadeless import in_its_colour
 from ..find.track import Start, start_curve
 from ..measurement import Measurement, Pose, failure
 from ..picture.photo import Photo
@@ -181,9 +181,7 @@ def measure_candidate(
     LostError
         If there is nothing to vouch for.
     """
-    unshaded = without_shade(photo, candidate)
-    if unshaded is not None:
-        candidate, view = unshaded
+    candidate, view = in_its_colour(photo, candidate, view)
     strip = along_candidate(view, candidate)
     if is_parted(strip):
         view, candidate = whole_rod(view, candidate)
@@ -283,7 +281,7 @@ def _refined(
             view.grey, replace(start, blur=blur), root=candidate.root, sign=view.sign,
             joints=setting.joints_px, walls=setting.walls_px if walls else None,
             face_px=setting.face_px(start.curve), sd_px=sd_px,
-            known_joints=joints, plain=None if view.mix is None else photo.grey,
+            known_joints=joints, plain=None if view.plain else photo.grey,
             hidden_px=candidate.hidden_px,
         )  # fmt: skip
 

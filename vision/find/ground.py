@@ -33,6 +33,11 @@ _FALLS_OFF, _GRAIN = 0.4, 0.006
 """Pixels that tell the paper's light; by how much it may fall off across the picture,
 as a logarithm; and how far noise scatters dark ones."""
 
+LUMINANCE = (0.114, 0.587, 0.299)
+"""Weights of blue, green and red in lightness: of their light here, but of their values
+in a picture that was made grey (ITU-R BT.601), which is another light where a coloured
+rod blurs into the paper."""
+
 _BETTER = 1.5
 """So much more must a mix of colours tell rod from paper than lightness does."""
 
@@ -54,6 +59,11 @@ class View:
     grey: Image
     sign: float
     mix: tuple[float, float, float] | None = None
+
+    @property
+    def plain(self) -> bool:
+        """Whether it shows how light things are, not their colour."""
+        return self.mix in (None, LUMINANCE)
 
 
 def ground_distance(photo: Photo) -> Binary:
@@ -119,13 +129,42 @@ def best_view(photo: Photo, points_px: Array, width_px: float) -> View:
     return View(grey=mixed, sign=1.0, mix=(b, g, r))
 
 
-def mixed(photo: Photo, mix: tuple[float, float, float] | None, sign: float) -> View:
-    """Return the view of another photograph of the same rod."""
-    colour = None if mix is None else photo.colour()
+def mixed(
+    photo: Photo, mix: tuple[float, float, float] | None, sign: float,
+    near: Array | None = None,
+) -> View:  # fmt: skip
+    """Return the view of a photograph in a mix of its colours.
+
+    Parameters
+    ----------
+    photo : Photo
+        The photograph.
+    mix : tuple of float or None
+        Weights of blue, green and red; None is its own grey.
+    sign : float
+        -1 where the rod is lighter than the paper.
+    near : ndarray, shape (n, 2), optional
+        Places (x, y) about which the picture is wanted; elsewhere it is bare paper.
+    """
+    box = (slice(None), slice(None)) if near is None else _box(near)
+    colour = None if mix is None else photo.colour(box)
     if colour is None:
         return View(grey=photo.grey, sign=sign)
-    grey = np.asarray(colour @ np.array(mix, np.float32), np.float32)
+    light = np.asarray(cv2.transform(colour, np.array([mix], np.float32)), np.float32)
+    if near is None:
+        return View(grey=light, sign=sign, mix=mix)
+    paper = float(np.median(light[::8, ::8]))
+    grey = np.full(photo.grey.shape, paper, np.float32)
+    grey[box] = light
     return View(grey=grey, sign=sign, mix=mix)
+
+
+def _box(points: Array) -> tuple[slice, slice]:
+    """Return the rows and columns that hold places."""
+    (left, top), (right, bottom) = (
+        np.maximum(ends(points, axis=0), 0.0).astype(int) for ends in (np.min, np.max)
+    )
+    return slice(top, bottom + 1), slice(left, right + 1)
 
 
 def _paper_light(work: Image) -> Image:

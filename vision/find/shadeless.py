@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 from ..curve.robust import median
 from ..picture.photo import Photo
 from .candidate import Candidate
-from .ground import View, mixed
+from .ground import LUMINANCE, View, mixed
 from .track import resample
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Mix = tuple[float, float, float]
 
 _BESIDE, _BESIDE_PX = 3.2, 8.0
 """How far beside an axis the light is looked at: in widths, and beyond that."""
@@ -29,12 +30,16 @@ _BESIDE, _BESIDE_PX = 3.2, 8.0
 _STATIONS = 60
 """About so many stations are looked at, on lanes a pixel apart."""
 
+_ROOM = 11.0
+"""How far about a rod its picture is looked at later, in widths."""
+
 _EVERY = 16
 """Of so many pixels along and across, one tells the paper's colour."""
 
-_COLOURED, _CLEAR = 0.05, 8.0
+_COLOURED, _CLEAR, _LIGHT = 0.05, 8.0, 1.6
 """How far a rod's colour is from the paper's, in shares of the light of each: at least,
-and over the noise of one pixel."""
+and over the noise of one pixel; and light of a rod, over the paper's, that tells it
+from any shade."""
 
 _ALL_ALONG = 0.6
 """Part of the stations at which something coloured is seen."""
@@ -60,8 +65,8 @@ _NOISE, _DEPTH = 0.003, 0.1
 """Least noise of the light of a pixel; and what a shade takes of it."""
 
 
-def without_shade(photo: Photo, rod: Candidate) -> tuple[Candidate, View] | None:
-    """Return a rod in the light that does not show its shade.
+def in_its_colour(photo: Photo, rod: Candidate, view: View) -> tuple[Candidate, View]:
+    """Return a coloured rod in the light that tells it, but not its shade.
 
     Parameters
     ----------
@@ -69,43 +74,46 @@ def without_shade(photo: Photo, rod: Candidate) -> tuple[Candidate, View] | None
         The photograph.
     rod : Candidate
         A rod, or its shade, or both as one.
+    view : View
+        The light in which that was found.
 
     Returns
     -------
-    tuple of Candidate and View, or None
-        None where there is no shade, or no colour that tells the rod from it.
+    rod : Candidate
+        The rod alone. Both are the same where there is no colour that tells it.
+    view : View
+        Without a shade it is the lightness that the colours have together.
     """
     points, normals, across = _lanes(rod)
     light = photo.colour_at(points[:, None] + across[:, None] * normals[:, None])
-    paper = paper_colour(photo)
+    paper = _paper_colour(photo)
     if light is None or paper is None:
-        return None
+        return rod, view
     share = light / paper
     tint = _tinted(share)
     band = _nearest_band(tint > 0.5, across)
     seen = np.flatnonzero(np.isfinite(band[:, 0]))
     if len(seen) < _ALL_ALONG * len(points):
-        return None
+        return rod, view
     middle = np.interp(np.arange(len(points)), seen, band[seen].mean(axis=1))
     width = median(np.ptp(band[seen], axis=1))
     brightness = share.mean(axis=2)
     if not _is_its_shade(brightness, middle, normals, width, across):
-        return None
+        return rod, view
+    reach = _ROOM * rod.width_px
+    near = np.vstack([rod.points_px - reach, rod.points_px + reach])
     if _missing_px(brightness, tint) < max(_MISSING * width, _MISSING_PX):
-        return None
-    mix = _discriminant(light, tint, paper)
-    if mix is None:
-        return None
+        as_it_is = view.mix is not None
+        return rod, view if as_it_is else mixed(photo, LUMINANCE, view.sign, near)
     along = slice(seen[0], seen[-1] + 1)
     axis = (points + middle[:, None] * normals)[along]
-    found = replace(rod, points_px=axis, width_px=width)
+    rod = replace(rod, points_px=axis, width_px=width)
     if _is_coarse(brightness, tint, middle, width):
-        return found, View(grey=photo.grey, sign=1.0)
-    b, g, r = (float(part) for part in mix)
-    return found, mixed(photo, (b, g, r), 1.0)
+        return rod, mixed(photo, LUMINANCE, 1.0, near)
+    return rod, mixed(photo, _discriminant(light, tint, paper), 1.0, near)
 
 
-def paper_colour(photo: Photo) -> Array | None:
+def _paper_colour(photo: Photo) -> Array | None:
     """Return the commonest light of each colour, (3,); None for a grey picture."""
     few = slice(None, None, _EVERY)
     colour = photo.colour((few, few))
@@ -153,16 +161,18 @@ def _is_its_shade(
 
 def _tinted(share: Array) -> Array:
     """Return how much of its light is the rod's, 0 to 1, by its colour; (n, m)."""
-    hue = share - share.mean(axis=2, keepdims=True)
+    brightness = share.mean(axis=2, keepdims=True)
+    hue = share - brightness
     away = np.linalg.norm(hue, axis=2)
     most = float(np.quantile(away, 0.97))
     noise = 0.7 * median(np.abs(np.diff(hue, axis=0)).max(axis=2).ravel())
-    if most < max(_COLOURED, _CLEAR * noise):
+    strong = away > 0.6 * most
+    light = median(brightness[strong].ravel())
+    if most < max(_COLOURED, _CLEAR * noise) or light > _LIGHT:
         return np.zeros(away.shape)
-    strong = hue[away > 0.6 * most]
-    direction = np.median(strong, axis=0)
+    direction = np.median(hue[strong], axis=0)
     direction /= np.linalg.norm(direction)
-    return np.asarray(hue @ direction / np.median(strong @ direction))
+    return np.asarray(hue @ direction / np.median(hue[strong] @ direction))
 
 
 def _missing_px(share: Array, tint: Array) -> float:
@@ -201,13 +211,12 @@ def _typical(part: Array, lane: Array) -> Array:
     return np.asarray(np.median(rows, axis=0))
 
 
-def _discriminant(light: Array, tint: Array, paper: Array) -> Array | None:
+def _discriminant(light: Array, tint: Array, paper: Array) -> Mix:
     """Return weights in which the paper is 0.65 lighter than the rod."""
     rod, ground = light[tint > 0.8], light[np.abs(tint) < 0.2]
-    if min(len(rod), len(ground)) < 50:
-        return None
     shade = _DEPTH * paper
     within = np.cov(ground.T) + np.outer(shade, shade) + _NOISE**2 * np.eye(3)
     step = np.median(ground, axis=0) - np.median(rod, axis=0)
     mix = np.linalg.solve(within, step)
-    return np.asarray(0.65 * mix / (mix @ step))
+    b, g, r = (float(part) for part in 0.65 * mix / (mix @ step))
+    return b, g, r
