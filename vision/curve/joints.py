@@ -213,7 +213,7 @@ def _ramps(model: _Model, places: Array) -> Array:
     return np.asarray(_moved(beyond, model.s, model.normals))
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath={"reassoc", "contract"})
 def _evidence(model: _Model, joints: Array, places: Array) -> tuple[float, Array]:
     """Return twice the log evidence of joints, and of one more at each place, (m,).
 

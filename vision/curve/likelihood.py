@@ -79,13 +79,14 @@ def _most_likely(
 ) -> float:  # fmt: skip
     """Return the penalty weight of greatest restricted likelihood.
 
-    It is looked for over 14 decades, and then in quarters of a decade about the best.
+    It is looked for over 14 decades by twos, then beside the best, ever closer, down to
+    a quarter of a decade.
     """
-    best, least = 0, np.inf
-    for turn in range(2):
+    best, least, step = -12, np.inf, 8
+    while step > 0:
         centre = best
-        for k in range(14) if turn == 0 else range(-3, 4):
-            power = 4 * k - 36 if turn == 0 else centre + k
+        for k in range(-3, 4) if step == 8 else range(-1, 2, 2):
+            power = centre + k * step
             weight = scale * 10.0 ** (0.25 * power)
             matrix = normal.copy()
             matrix[1:, 1:] += weight * penalty
@@ -96,4 +97,5 @@ def _most_likely(
             score = count * np.log(left) + logs - rank * np.log(weight)
             if score < least:
                 best, least = power, score
+        step //= 2
     return float(scale * 10.0 ** (0.25 * best))

@@ -100,11 +100,29 @@ def sample_lanes(
 def _sample_lanes(
     grey: Image, points: Array, theta: Array, across: Array, sign: float, light: Array
 ) -> None:
+    height, width = grey.shape
+    low, high = across.min(), across.max()
     for k in range(len(points)):
+        x, y = points[k]
         u, v = -np.sin(theta[k]), np.cos(theta[k])
+        left, right = x + low * u, x + high * u
+        upper, lower = y + low * v, y + high * v
+        if (
+            0.0 <= left < width - 1.0 and 0.0 <= right < width - 1.0
+            and 0.0 <= upper < height - 1.0 and 0.0 <= lower < height - 1.0
+        ):  # fmt: skip
+            # Well inside: no sample needs to be checked.
+            for i in range(across.size):
+                px, py = x + across[i] * u, y + across[i] * v
+                j, m = int(px), int(py)
+                fx, fy = px - j, py - m
+                a, b = grey[m, j], grey[m, j + 1]
+                c, d = grey[m + 1, j], grey[m + 1, j + 1]
+                above, below = a + (b - a) * fx, c + (d - c) * fx
+                light[i, k] = sign * (above + (below - above) * fy)
+            continue
         for i in range(across.size):
-            x, y = points[k, 0] + across[i] * u, points[k, 1] + across[i] * v
-            light[i, k] = sign * _bilinear(grey, x, y)
+            light[i, k] = sign * _bilinear(grey, x + across[i] * u, y + across[i] * v)
 
 
 def fit_step(
@@ -227,21 +245,24 @@ def line_through(across: Array, crossing: Array) -> EndFace | None:
     found = int(np.count_nonzero(np.isfinite(crossing)))
     if found < 0.5 * len(crossing):
         return None
-    place, slope, scatter, used = _fit_line(across, crossing)
+    place, slope, scatter, used, spread = _fit_line(across, crossing)
     sigma = scatter / math.sqrt(used) + 0.005
     return EndFace(
         s=place,
         sigma=sigma,
         skew=slope,
-        skew_sd=sigma / float(np.std(across)),
+        skew_sd=sigma / spread,
         scatter=scatter,
         found=found / len(crossing),
     )
 
 
 @njit(cache=True)
-def _fit_line(across: Array, crossing: Array) -> tuple[float, float, float, int]:
-    """Return place, slope, scatter and number of crossings of the line's last fit."""
+def _fit_line(across: Array, crossing: Array) -> tuple[float, float, float, int, float]:
+    """Return place, slope, scatter and number of crossings of the line's last fit.
+
+    And the standard deviation of where the lanes are.
+    """
     good = np.isfinite(crossing)
     residual = np.empty(len(across))
     place, slope, used = 0.0, 0.0, 0
@@ -259,7 +280,7 @@ def _fit_line(across: Array, crossing: Array) -> tuple[float, float, float, int]
             break
         good = kept
     left = residual[good]
-    return place, slope, np.sqrt(np.mean(left**2)), len(left)
+    return place, slope, np.sqrt(np.mean(left**2)), len(left), np.std(across)
 
 
 def crossings_of(

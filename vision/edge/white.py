@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .edges import STEP_PX, _sample
-from .flank import WHITE, Flanks, fit_flanks, median_profiles
+from .flank import WHITE, Flanks, fit_flanks, is_held, median_profiles
 from .state import Seen, State
 from .wall_light import MIRRORED, SKY, Walls, reflectance
 
@@ -35,17 +35,20 @@ def saturated(seen: Seen, sign: float) -> float:
     return float(np.mean(light[seen.good] > WHITE))
 
 
+def is_cut_off(grey: Image, seen: Seen, sign: float) -> bool:
+    """Whether so much of a rod lies beside what the sensor could not hold."""
+    return saturated(seen, sign) > SOME and is_held(grey)
+
+
 def to_whole_edges(
     grey: Image, state: State, seen: Seen, walls: Walls | None, sign: float, *,
     anew: bool,
 ) -> Seen:  # fmt: skip
     """Move edges that are cut off at white to where they are with all the light.
 
-    And know the blur, which an edge that is cut off seems to have too little of. The
-    edges of other rods stay as they are. Unless `anew`, by what was fitted before.
+    And know the blur, which an edge that is cut off seems to have too little of. Unless
+    `anew`, by what was fitted before.
     """
-    if not saturated(seen, sign) > SOME:
-        return seen
     bounds = np.linspace(0, len(seen.s), _PIECES + 1).astype(np.int64)
     if anew or state.flanks is None:
         state.flanks = _flanks(grey, state, seen, bounds, walls, sign)

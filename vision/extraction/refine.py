@@ -19,11 +19,10 @@ from ..curve.spline import Smooth
 from ..edge.clamp import ClampLines
 from ..edge.edges import Edges, find_edges, joined, slices
 from ..edge.ends import find_ends
-from ..edge.flank import is_held
 from ..edge.state import LostError, Root, Seen, State
 from ..edge.step_line import EndFace
 from ..edge.wall_light import Walls, to_wall_ends
-from ..edge.white import SOME, saturated, to_whole_edges
+from ..edge.white import is_cut_off, saturated, to_whole_edges
 from ..find.track import FLARED, Start
 
 Array = NDArray[np.float64]
@@ -169,13 +168,12 @@ def refine(
         tip, lines, first = find_ends(grey, state, seen, root, sign, 0, walls)
         end, still_px = tip.s, _STILL_PX
     places, aside, settled = None, np.inf, False
-    held = is_held(grey)
     for turn in range(_PASSES):
         if turn:
             seen = _look(grey, state, sign, turn, seeking=seeking)
         if walls is not None:
             seen = to_wall_ends(state, seen, walls)
-        if held and not seeking:
+        if not seeking and is_cut_off(grey, seen, sign):
             seen = to_whole_edges(grey, state, seen, walls, sign, anew=aside > _KEPT_PX)
         known = known_joints
         if known is None and places is not None and aside <= _KEPT_PX:
@@ -206,7 +204,7 @@ def refine(
         sigma_width=sigma_width, tip=replace(tip, s=tip.s - first),
         clamp=None if lines is None else lines.shifted(first), rough=state.rough,
         blur=state.blur, joints=None if places is None else places - first,
-        saturated=white, whole=held and white > SOME, settled=settled,
+        saturated=white, whole=is_cut_off(grey, seen, sign), settled=settled,
     )  # fmt: skip
 
 

@@ -65,16 +65,18 @@ class Strip:
 
     def between(self, first: float, last: float) -> slice:
         """Return the stations from one arc length to another, the nearest at least."""
-        step = self.s[1] - self.s[0]
-        ends = np.rint((np.array([first, last]) - self.s[0]) / step).astype(int)
-        low, high = np.clip(ends, 0, len(self.s) - 1)
-        return slice(int(low), int(high) + 1)
+        low, high = _nearest(self.s, first), _nearest(self.s, last)
+        return slice(low, high + 1)
 
     def lanes(self, *across: float) -> Array:
         """Return the light on the lanes nearest to offsets in widths, (m, n)."""
-        step = self.across[1] - self.across[0]
-        place = np.rint((np.array(across) - self.across[0]) / step).astype(int)
-        return np.asarray(self.light[np.clip(place, 0, len(self.across) - 1)])
+        return np.asarray(self.light[[_nearest(self.across, x) for x in across]])
+
+
+def _nearest(grid: Array, value: float) -> int:
+    """Return the index of the value of an even grid that is nearest."""
+    place = round((value - grid[0]) / (grid[1] - grid[0]))
+    return int(min(max(place, 0), len(grid) - 1))
 
 
 def _sampled(
