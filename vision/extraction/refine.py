@@ -34,9 +34,12 @@ _SEEKING_PASSES, _NEAR_PX = 2, 0.4
 curve; one that moves it by less is the last of them."""
 _SURE_PX = 0.25
 """A start that is so sure need not be sought."""
-_STILL_PX, _ENDS_STILL_PX = 0.02, 0.15
-"""By how much the curve and its ends may move when all is found; the ends are those of
-the curve as it is then."""
+_STILL_PX, _ENDS_STILL_PX = 0.05, 0.15
+"""By how much the curve and its ends may move when all is found: the next pass would
+move it by a tenth of that. The ends are those of the curve as it is then."""
+_SHADED_STILL_PX, _SHADED_PX = 0.02, 0.02
+"""By how much where half of the midline is pulled by so much shade: the blur is found
+slowly there, and the levels hang on it."""
 _NEAR_STILL_PX = 0.08
 """The first of them in a film, where time counts: what is left is a part of it."""
 _KEPT_PX = 0.05
@@ -192,7 +195,10 @@ def refine(
         tip, lines, first = find_ends(grey, state, seen, root, sign, later, walls)
         end = tip.s
         moved = abs(first) + abs(end - state.last)
-        still = aside < still_px and moved < _ENDS_STILL_PX
+        near_px = still_px
+        if still_px == _STILL_PX and median(shaded) > _SHADED_PX:
+            near_px = _SHADED_STILL_PX
+        still = aside < near_px and moved < _ENDS_STILL_PX
         settled = still and not seeking
         if settled:
             break
