@@ -280,7 +280,8 @@ def _fit_line(across: Array, crossing: Array) -> tuple[float, float, float, int,
             break
         good = kept
     left = residual[good]
-    return place, slope, np.sqrt(np.mean(left**2)), len(left), np.std(across)
+    spread = float(np.std(across))
+    return place, slope, np.sqrt(np.mean(left**2)), len(left), spread
 
 
 def crossings_of(
