@@ -6,18 +6,22 @@ import numpy as np
 import pytest
 
 from magbend.vision.curve.curve import Curve
-from magbend.vision.edge.clamp import find_clamp
+from magbend.vision.edge.clamp import ClampLines, find_clamp
 
 ROD, PAPER, TOP = 0.03, 0.6, 0.3
 
 
-def clamped(face: float, depth: float) -> tuple[np.ndarray, Curve]:
-    """A rod along x that leaves the face of a clamp at x = 60, `depth` px deep."""
+def clamped(face: float, depth: float, shade: float = 0.0) -> tuple[np.ndarray, Curve]:
+    """A rod along x that leaves the face of a clamp at x = 60, `depth` px deep.
+
+    On one side the paper lies in a shade.
+    """
     x, y = np.meshgrid(np.arange(200.0), np.arange(120.0))
     into = 1.0 / (1.0 + np.exp((x - 60.0) / 0.6))
     deeper = 1.0 / (1.0 + np.exp((x - 60.0 + depth) / 0.6))
     rod = 1.0 / (1.0 + np.exp((np.abs(y - 60.0) - 10.0) / 0.6))
-    light = PAPER + (ROD - PAPER) * rod
+    paper = PAPER * (1.0 - shade * (y > 60.0))
+    light = paper + (ROD - paper) * rod
     light += (face - light) * into
     light += (TOP - light) * deeper
     s = np.linspace(0.0, 120.0, 121)
@@ -27,12 +31,23 @@ def clamped(face: float, depth: float) -> tuple[np.ndarray, Curve]:
     )
 
 
-@pytest.mark.parametrize(("face", "depth"), [(0.1, 12.0), (0.13, 7.0), (0.3, 9.0)])
-def test_rod_ends_where_its_dark_ends_not_at_the_top_edge_of_the_face(face, depth):
-    grey, curve = clamped(face, depth)
-    lines = find_clamp(
+def lines_at(grey: np.ndarray, curve: Curve) -> ClampLines:
+    return find_clamp(
         grey, curve, expected=-5.0, width=20.0, blur=1.0, contrast=PAPER - ROD,
         reach=20.0,
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("shade", [0.3, 0.6])
+def test_a_shade_on_one_side_does_not_turn_the_front(shade):
+    front = lines_at(*clamped(0.1, 20.0, shade)).front
+    assert front is not None
+    assert front.skew == pytest.approx(0.0, abs=5e-4)
+    assert front.s == pytest.approx(-5.0, abs=0.02)
+
+
+@pytest.mark.parametrize(("face", "depth"), [(0.1, 12.0), (0.13, 7.0), (0.3, 9.0)])
+def test_rod_ends_where_its_dark_ends_not_at_the_top_edge_of_the_face(face, depth):
+    lines = lines_at(*clamped(face, depth))
     assert lines.face is not None
     assert lines.face.s == pytest.approx(-5.0, abs=0.3)

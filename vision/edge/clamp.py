@@ -37,6 +37,9 @@ _CLAMP_SPAN = 3.0
 """So many blurs of the clamp are fitted: its foot and the corner over the rod are dark,
 and only what lies right beside the line makes the step."""
 
+_LEAST_PX = 0.8
+"""Blur for which a lane's own levels are sought at least: fewer samples do not tell."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClampLines:
@@ -173,9 +176,10 @@ def _front(
     line = line_through(across, crossing)
     if line is None or not fine:
         return line
+    wide = max(blur, _LEAST_PX)
     return fit_step(
         np.concatenate(seen), s, across, line, crossing, blur=blur,
-        inner=_CLAMP_SPAN * blur, outer=SPAN * blur,
+        inner=_CLAMP_SPAN * wide, outer=SPAN * wide, own=True,
     )  # fmt: skip
 
 

@@ -28,6 +28,12 @@ SPAN = 5.5
 straight no farther."""
 _SHARPER, _SOFTER = 0.7, 2.5
 """By how much an end may be sharper, or softer, than was expected."""
+_ROUNDS, _ROUNDS_OWN = 3, 4
+"""Steps of Gauss-Newton, where all lanes have the same levels, or each its own."""
+_OUTLYING, _LEAST_OFF, _ALIKE = 4.0, 0.02, 4.0
+"""Median pulls beyond which a lane counts less, with so many px more; and lanes that
+tell as much as one."""
+_LEAST_PIVOT = 1e-6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,7 +133,7 @@ def _sample_lanes(
 
 def fit_step(
     light: Array, s: Array, across: Array, line: EndFace, crossing: Array, *,
-    blur: float, inner: float, outer: float,
+    blur: float, inner: float, outer: float, own: bool = False,
 ) -> EndFace:  # fmt: skip
     """Return a line moved to where a blurred step fits the lanes best.
 
@@ -155,17 +161,37 @@ def fit_step(
         the line comes on top.
     inner, outer : float
         How far before and behind the line to fit, px.
+    own : bool
+        Whether each lane has levels of its own, as where some lie in a shade: common
+        ones would turn the line towards it. A lane then counts by the square of its
+        step's height, and less the farther it is off.
     """
     wide = math.hypot(blur, line.scatter)
     away = np.abs(crossing - line.s - line.skew * across)
     near = away < 3.5 * (line.scatter + 0.02)
-    place, skew, rise, fitted = _fit_step(
-        light[near], s, across[near], line.s, line.skew, wide, inner, outer
+    place, skew, fitted, rise, known, off = _fit_step(
+        light[near], s, across[near], line.s, line.skew, wide, inner, outer, own
     )
-    if not (abs(place - line.s) < 2.0 * wide and rise > 0.0):
+    if not (abs(place - line.s) < 2.0 * wide and known.any()):
         return line
-    line = replace(line, s=place, skew=skew, rise=rise, blur=fitted)
+    share = known / known.sum()
+    line = replace(line, s=place, skew=skew, rise=float(share @ rise), blur=fitted)
+    if own:
+        line = _scattered(line, across[near], off, share)
     return _to_whole_step(light[near], s, across[near], line, wide, inner, outer)
+
+
+def _scattered(line: EndFace, across: Array, off: Array, share: Array) -> EndFace:
+    """Return a line with the scatter of its lanes, and what that does to it."""
+    scatter = math.sqrt(share @ off**2)
+    middle = float(share @ across)
+    spread = float(share @ (across - middle) ** 2)
+    alone = math.sqrt(_ALIKE * float(share @ share))
+    sigma = scatter * alone + 0.005
+    return replace(
+        line, scatter=scatter, sigma=sigma * math.hypot(1.0, middle / spread**0.5),
+        skew_sd=sigma / math.sqrt(spread),
+    )  # fmt: skip
 
 
 def _to_whole_step(
@@ -190,54 +216,112 @@ def _to_whole_step(
     if not median(profile[x > 0.6 * x[-1]]) > WHITE:
         return line
     step = fit_flanks(x, profile[None], blur=blur, known=True)
-    return replace(line, s=line.s + sign * float(step.moves()[0, 0]))
+    # What is cut off looks sharper than it is.
+    return replace(line, s=line.s + sign * float(step.moves()[0, 0]), blur=blur)
+
+
+@njit(cache=True, error_model="numpy")
+def _fit_step(
+    light: Array, s: Array, across: Array, place: float, skew: float, blur: float,
+    inner: float, outer: float, own: bool,
+) -> tuple[float, float, float, Array, Array, Array]:  # fmt: skip
+    """Gauss-Newton for place and skew of a line and the blur, each group's levels out.
+
+    A group is a lane with levels of its `own`, else all lanes. Returns the three, and
+    of each group the step's height, how surely it tells the place, and by how much it
+    tells another one.
+    """
+    groups = len(light) if own else 1
+    least, most = _SHARPER * blur, _SOFTER * blur
+    weight, known, off = np.ones(groups), np.zeros(groups), np.zeros(groups)
+    equations, heights = np.zeros((groups, 3, 4)), np.zeros((groups, 4))
+    step = np.zeros(3)
+    for _ in range(_ROUNDS_OWN if own else _ROUNDS):
+        _fill(light, s, across, place, skew, blur, inner, outer, equations, heights)
+        rise: Array = heights[:, 3].copy()
+        for _again in range(2):  # the step changes the levels
+            total = np.zeros((3, 4))
+            for g in range(groups):
+                scale = weight[g] * rise[g]
+                total[:, :3] += scale * rise[g] * equations[g, :, :3]
+                total[:, 3] += scale * equations[g, :, 3]
+            if not np.linalg.det(total[:, :3]) > 0.0:
+                return place, skew, blur, rise, np.zeros(groups), off
+            step[:] = np.linalg.solve(total[:, :3].copy(), total[:, 3].copy())
+            rise = heights[:, 3] - rise * (heights[:, :3].copy() @ step)
+        place, skew = place + step[0], skew + step[1]
+        blur = min(max(blur + step[2], least), most)
+        known = weight * equations[:, 0, 0] * rise * np.maximum(rise, 0.0)
+        if own:
+            told = equations[:, 0, 3] / rise - equations[:, 0, 2] * step[2]
+            off = told / equations[:, 0, 0] - step[0] - step[1] * across
+            pull = np.where(known > 0.0, np.abs(off) * np.sqrt(known / weight), 0.0)
+            usual = np.median(pull) + _LEAST_OFF * np.sqrt(np.max(known))
+            weight = 1.0 / (1.0 + (pull / (_OUTLYING * usual)) ** 2)
+            off, weight = np.where(known > 0.0, off, 0.0), weight * (known > 0.0)
+    return place, skew, blur, rise, known, off
 
 
 @njit(cache=True)
-def _fit_step(
+def _fill(
     light: Array, s: Array, across: Array, place: float, skew: float, blur: float,
-    inner: float, outer: float,
-) -> tuple[float, float, float, float]:  # fmt: skip
-    """Gauss-Newton: two levels, the outer one's slope, the line's two numbers, blur.
+    inner: float, outer: float, equations: Array, heights: Array,
+) -> None:  # fmt: skip
+    """Fill in normal equations of each group, (groups, 3, 4), and heights, (groups, 4).
 
-    Returns place and skew of the line, and height and blur of the step.
+    Of place, skew and blur, times the step's height; the levels, and the outer one's
+    slope, are eliminated. The height is the last number less the other three times
+    these.
     """
-    change, height = np.empty(6), 0.0
-    least, most = _SHARPER * blur, _SOFTER * blur
-    for _ in range(3):
-        normal, right = np.zeros((6, 6)), np.zeros(6)
-        for i in range(across.size):
-            at = place + skew * across[i]
-            first = max(int(np.ceil((at - inner - s[0]) / (s[1] - s[0]))), 0)
-            last = min(int((at + outer - s[0]) / (s[1] - s[0])), s.size - 1)
-            for k in range(first, last + 1):
-                t = (s[k] - at) / blur
-                outside = 0.5 * (1.0 + math.erf(t / math.sqrt(2.0)))
-                bell = math.exp(-0.5 * t * t) / math.sqrt(2.0 * math.pi)
-                change[0] = 1.0 - outside
-                change[1] = outside
-                change[2] = t * outside + bell
-                change[3] = -bell
-                change[4] = -bell * across[i]
-                change[5] = -bell * t
-                if not np.isfinite(light[i, k]):
-                    continue
-                for a in range(6):
-                    right[a] += change[a] * light[i, k]
-                    for b in range(a + 1):
-                        normal[a, b] += change[a] * change[b]
-        for a in range(6):
-            for b in range(a):
-                normal[b, a] = normal[a, b]
-        if not np.linalg.det(normal) > 0.0:
-            return place, skew, 0.0, blur
-        found = np.linalg.solve(normal, right)
-        height = found[1] - found[0]
-        step = blur / height
-        place += step * found[3]
-        skew += step * found[4]
-        blur = min(max(blur + step * found[5], least), most)
-    return place, skew, height, blur
+    change, full = np.empty(7), np.zeros((7, 7))
+    for i in range(across.size):
+        at = place + skew * across[i]
+        first = max(int(np.ceil((at - inner - s[0]) / (s[1] - s[0]))), 0)
+        last = min(int((at + outer - s[0]) / (s[1] - s[0])), s.size - 1)
+        for k in range(first, last + 1):
+            if not np.isfinite(light[i, k]):
+                continue
+            t = (s[k] - at) / blur
+            outside = 0.5 * (1.0 + math.erf(t / math.sqrt(2.0)))
+            bell = math.exp(-0.5 * t * t) / math.sqrt(2.0 * math.pi)
+            change[0] = 1.0 - outside
+            change[1] = outside
+            change[2] = t * outside + bell
+            change[3] = -bell / blur
+            change[4] = -bell / blur * across[i]
+            change[5] = -bell / blur * t
+            change[6] = light[i, k]
+            for a in range(7):
+                for b in range(a, 7):
+                    full[a, b] += change[a] * change[b]
+        if len(equations) > 1 or i == across.size - 1:
+            g = min(i, len(equations) - 1)
+            _eliminate(full, heights[g])
+            for a in range(3):
+                for b in range(4):
+                    equations[g, a, b] = full[3 + min(a, b), 3 + max(a, b)]
+            full[:] = 0.0
+
+
+@njit(cache=True)
+def _eliminate(full: Array, heights: Array) -> None:
+    """Take two levels and a slope out of the upper half of normal equations, (7, 7).
+
+    Fill in what the other four add to the difference of the levels.
+    """
+    for p in range(3):
+        if full[p, p] < _LEAST_PIVOT:
+            full[:], heights[:] = 0.0, 0.0
+            return
+        for a in range(p + 1, 7):
+            part = full[p, a] / full[p, p]
+            for b in range(a, 7):
+                full[a, b] -= part * full[p, b]
+    for j in range(3, 7):
+        slope = full[2, j] / full[2, 2]
+        outer = (full[1, j] - full[1, 2] * slope) / full[1, 1]
+        inner = (full[0, j] - full[0, 1] * outer - full[0, 2] * slope) / full[0, 0]
+        heights[j - 3] = outer - inner
 
 
 def line_through(across: Array, crossing: Array) -> EndFace | None:
