@@ -8,7 +8,7 @@ from scipy.special import ndtr
 
 from magbend.vision.edge.highlight import Bars, fit_bars
 
-X = np.arange(-20.0, 20.0, 0.5)
+X = np.arange(-40.0, 40.0, 0.5)
 LOW, HIGH = -9.7, 10.2
 
 
@@ -51,6 +51,15 @@ def test_light_that_a_sensor_does_not_hold_is_not_taken_off():
     glossy, plain = profile(-2.0, 3.0, light=1.6), profile(-2.0, 3.0, light=0.0)
     left = glossy - fitted(glossy, -2.0, 3.0).highlight(X[None])[0]
     assert np.abs(left - plain).max() < 0.02
+
+
+@pytest.mark.parametrize("blur", [3.0, 6.0, 8.0])
+def test_edges_that_feel_each_other_are_where_they_are(blur):
+    light = profile(0.0, 1.0, light=0.0, blur=blur)[None]
+    start = np.array([[LOW - 1.5, HIGH + 1.5]])
+    bars = fit_bars(X, light, start, blur=0.8 * blur)
+    assert np.exp(bars.blur[0]) == pytest.approx(blur, rel=0.01)
+    assert bars.high[0] - bars.low[0] == pytest.approx(HIGH - LOW, abs=0.1)
 
 
 def test_bars_between_profiles_lie_between_them():

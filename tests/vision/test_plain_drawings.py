@@ -229,6 +229,20 @@ def test_a_streak_of_gloss_all_along_moves_no_edge(light, low, high):
     assert np.abs(aside).max() < 0.2
 
 
+@pytest.mark.parametrize(("rod", "blur_px"), [(BLACK, 5.0), (GREEN, 7.5), (RED, 6.5)])
+def test_blur_moves_no_edge(rod, blur_px):
+    sharp = measured(rod=BLACK, turn_deg=50.0)
+    soft = extract(
+        drawn(rod=rod, turn_deg=50.0, blur_px=blur_px), SCALE, rod_height_mm=0.0
+    )
+    assert soft.ok, soft.reason
+    assert set(soft.flags) == {"blurred"}
+    assert soft.width_px == pytest.approx(sharp.width_px, abs=0.25)
+    aside = signed_distance(soft.points_px[1:-1], sharp.points_px)
+    assert np.abs(aside).max() < 0.1
+    assert np.hypot(*np.subtract(soft.tip_px, sharp.tip_px)) < 0.5
+
+
 def test_two_rods_side_by_side_are_doubted():
     shared = np.array([0.0, 1.4 * WIDTH])
     second = strip(0.0, -0.5, 0.5) + shared

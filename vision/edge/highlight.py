@@ -28,7 +28,8 @@ _LIGHT_SD, _SLOPE_SD = 1.0, 0.03
 """Doubt of the line's light, as it seems at first; slope of the paper, per px; both in
 the span of a profile's light."""
 
-_NUMBERS = 12
+_HELD = 1e6
+"""Weight of a number that is not sought."""
 
 
 class Bars(NamedTuple):
@@ -81,8 +82,15 @@ class Bars(NamedTuple):
         return np.asarray(np.minimum(whole, np.maximum(bare, 1.0)) - bare)
 
 
-def fit_bars(x: Array, light: Array, near: Array, *, blur: float) -> Bars:
-    """Fit a dark bar with a light one in it to profiles across a rod.
+_NUMBERS = len(Bars._fields)
+_BLUR, _LIGHT = Bars._fields.index("blur"), Bars._fields.index("light")
+_OF_HIGHLIGHT = [Bars._fields.index(k) for k in ("first", "last", "spread", "light")]
+
+
+def fit_bars(
+    x: Array, light: Array, near: Array, *, blur: float, known: bool = False
+) -> Bars:
+    """Fit a dark bar with a light one in it, or without, to profiles across a rod.
 
     Levenberg and Marquardt's method, each profile by itself. Where a sensor holds no
     more, a profile may be lighter than the picture tells.
@@ -93,12 +101,19 @@ def fit_bars(x: Array, light: Array, near: Array, *, blur: float) -> Bars:
         Places of samples, px.
     light : ndarray, shape (n, m)
         Profiles; NaN is left out.
-    near : ndarray, shape (n, 4)
-        About where the rod and the highlight begin and end: low, first, last, high.
+    near : ndarray, shape (n, 4) or (n, 2)
+        About where the rod and the highlight begin and end: low, first, last, high; or
+        the rod alone, if it has none.
     blur : float
-        Standard deviation of the blur, px, about.
+        Standard deviation of the blur, px: about, unless `known`.
     """
-    at, weights = _start(x, light, near, blur)
+    matt = near.shape[1] == 2
+    at, weights = _start(x, light, near[:, [0, 0, 1, 1]] if matt else near, blur)
+    if matt:
+        at[:, _LIGHT] = 0.0
+        weights[:, _OF_HIGHLIGHT] = _HELD
+    if known:
+        weights[:, _BLUR] = _HELD
     expected, damping = at.copy(), np.full(len(at), 1e-2)
     change, misfit = _misfit(x, light, at)
     best = _cost(misfit, at - expected, weights)
@@ -127,7 +142,7 @@ def fit_bars(x: Array, light: Array, near: Array, *, blur: float) -> Bars:
 def _start(x: Array, light: Array, near: Array, blur: float) -> tuple[Array, Array]:
     """Return numbers to set out from, and how sure they are, (n, 12) each."""
     low, first, last, high = near.T[..., None]
-    most, least = np.nanmax(light, axis=1), np.nanmin(light, axis=1)
+    most, least = np.fmax.reduce(light, axis=1), np.fmin.reduce(light, axis=1)
 
     def median(inside: NDArray[np.bool_]) -> Array:
         seen = inside & np.isfinite(light)

@@ -20,7 +20,7 @@ from ..find.candidate import Candidate
 from ..find.choose import find_rod, search_rod
 from ..find.coloured import shows_another
 from ..find.ground import View
-from ..find.shadeless import in_its_colour
+from ..find.shadeless import in_its_colour, in_lightness
 from ..find.track import Start, start_curve
 from ..measurement import Measurement, Pose, failure
 from ..picture.photo import Photo
@@ -40,7 +40,7 @@ from .refine import Refined, refine
 from .setting import Setting
 from .specimen_frame import measurement
 from .streak import is_parted, whole_rod
-from .strip import along_candidate, along_rod
+from .strip import along_candidate, along_rod, blur_of
 from .two_levels import rod_alone
 
 Array = NDArray[np.float64]
@@ -62,9 +62,13 @@ BOTH = 1.25
 SMOOTH = 0.12
 """Blur for a rough rod, in widths: its two edges do not feel each other yet."""
 
-COLLAPSED, WIDE = 0.9, 0.25
-"""Width over that at half level, below which edges may be more blurred than they seem;
-and the blur from which they are then sought, in widths."""
+FAR, WANDER = 0.15, 8.0
+"""Blur, in widths, from which edges are sought as blurred from the start, and in jumps
+of the width, which are more on a yarn."""
+
+TOO_FAR, COLLAPSED = 0.5, 0.9
+"""Blur, in widths, in which a width cannot be told from the blur; and width over that
+of the start, below which edges were lost."""
 
 
 def extract(photo: Photo, calibration: Calibration | None, **known: Any) -> Measurement:
@@ -181,8 +185,16 @@ def measure_candidate(
     LostError
         If there is nothing to vouch for.
     """
-    candidate, view = in_its_colour(photo, candidate, view)
     strip = along_candidate(view, candidate)
+    blur, width, jump = blur_of(strip)
+    far = blur > max(FAR * width, WANDER * jump)
+    found = view
+    if far:  # no shade is hard
+        view = in_lightness(photo, candidate, view)
+    else:
+        candidate, view = in_its_colour(photo, candidate, view)
+    if view is not found:
+        strip = along_candidate(view, candidate)
     if is_parted(strip):
         view, candidate = whole_rod(view, candidate)
         strip = along_candidate(view, candidate)
@@ -190,10 +202,14 @@ def measure_candidate(
         candidate = replace(candidate, rivalled=True)
     grey, sign = view.grey, view.sign
     start = _start(grey, candidate, sign)
-    alone = None if start.rough else rod_alone(strip, candidate, start.width)
+    alone = None if start.rough or far else rod_alone(strip, candidate, start.width)
     if alone is not None:
         candidate, start = alone, _start(grey, alone, sign)
-    if start.rough:
+    if far:
+        # Taken for sharp, such edges would be sought between too close levels, and seem
+        # the sharper for it.
+        start = replace(start, rough=False, blur=blur, width=width)
+    elif start.rough:
         # Strands, gaps and hairs blurred away, what is left is how much is rod.
         blur = SMOOTH * start.width
         grey = np.asarray(cv2.GaussianBlur(grey, (0, 0), blur))
@@ -269,28 +285,20 @@ def _refined(
     photo: Photo, view: View, start: Start, candidate: Candidate, setting: Setting,
     sd_px: float, joints: Array | None,
 ) -> Refined:  # fmt: skip
-    """Return axis, edges and ends; those of a far blurred rod from a wide blur on.
-
-    Taken for sharp, a far blurred edge is sought between too close levels, and seems
-    the sharper for it; from the other end its blur is found.
-    """
+    """Return axis, edges and ends, where these are as far apart as at the start."""
     walls = setting.calibration is not None and view.sign > 0.0 and not setting.is_round
-
-    def from_blur(blur: float) -> Refined:
-        return refine(
-            view.grey, replace(start, blur=blur), root=candidate.root, sign=view.sign,
-            joints=setting.joints_px, walls=setting.walls_px if walls else None,
-            face_px=setting.face_px(start.curve), sd_px=sd_px,
-            known_joints=joints, plain=None if view.plain else photo.grey,
-            hidden_px=candidate.hidden_px,
-        )  # fmt: skip
-
-    least = 0.0 if start.rough else COLLAPSED * start.width
-    refined = from_blur(start.blur)
-    if refined.typical_width >= least:
-        return refined
-    refined = from_blur(WIDE * start.width)
-    if refined.typical_width < least:
+    refined = refine(
+        view.grey, start, root=candidate.root, sign=view.sign,
+        joints=setting.joints_px, walls=setting.walls_px if walls else None,
+        face_px=setting.face_px(start.curve), sd_px=sd_px,
+        known_joints=joints, plain=None if view.plain else photo.grey,
+        hidden_px=candidate.hidden_px,
+    )  # fmt: skip
+    if start.blur > FAR * start.width:
+        lost = refined.blur > TOO_FAR * refined.typical_width
+    else:
+        lost = not start.rough and refined.typical_width < COLLAPSED * start.width
+    if lost:
         raise LostError(
             "edges_lost",
             "the rod's two edges are seen closer together than it is wide: focus the "

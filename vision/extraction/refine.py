@@ -19,6 +19,7 @@ from ..curve.spline import Smooth
 from ..edge.clamp import ClampLines
 from ..edge.edges import Edges, find_edges, joined, slices
 from ..edge.ends import find_ends
+from ..edge.own_width import to_own_width
 from ..edge.state import LostError, Root, Seen, State
 from ..edge.step_line import EndFace
 from ..edge.wall_light import Walls, to_wall_ends
@@ -178,6 +179,8 @@ def refine(
             seen = to_wall_ends(state, seen, walls)
         if not seeking and is_cut_off(grey, seen, sign):
             seen = to_whole_edges(grey, state, seen, walls, sign, anew=aside > _KEPT_PX)
+        if not (seeking or state.rough):
+            seen = to_own_width(grey, state, seen, sign)
         known = known_joints
         if known is None and places is not None and aside <= _KEPT_PX:
             known = places - first

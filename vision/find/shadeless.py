@@ -100,17 +100,37 @@ def in_its_colour(photo: Photo, rod: Candidate, view: View) -> tuple[Candidate, 
     brightness = share.mean(axis=2)
     if not _is_its_shade(brightness, middle, normals, width, across):
         return rod, view
-    reach = _ROOM * rod.width_px
-    near = np.vstack([rod.points_px - reach, rod.points_px + reach])
     if _missing_px(brightness, tint) < max(_MISSING * width, _MISSING_PX):
-        as_it_is = view.mix is not None
-        return rod, view if as_it_is else mixed(photo, LUMINANCE, view.sign, near)
+        return rod, in_lightness(photo, rod, view)
+    near = _near(rod)
     along = slice(seen[0], seen[-1] + 1)
     axis = (points + middle[:, None] * normals)[along]
     rod = replace(rod, points_px=axis, width_px=width)
     if _is_coarse(brightness, tint, middle, width):
         return rod, mixed(photo, LUMINANCE, 1.0, near)
     return rod, mixed(photo, _discriminant(light, tint, paper), 1.0, near)
+
+
+def in_lightness(photo: Photo, rod: Candidate, view: View) -> View:
+    """Return the lightness that the colours about a rod have together.
+
+    Parameters
+    ----------
+    photo : Photo
+        The photograph.
+    rod : Candidate
+        The rod.
+    view : View
+        The light in which it was found; the same if that was mixed, or has no colour.
+    """
+    if view.mix is not None:
+        return view
+    return mixed(photo, LUMINANCE, view.sign, _near(rod))
+
+
+def _near(rod: Candidate) -> Array:
+    reach = _ROOM * rod.width_px
+    return np.vstack([rod.points_px - reach, rod.points_px + reach])
 
 
 def _paper_colour(photo: Photo) -> Array | None:
