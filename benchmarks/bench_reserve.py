@@ -34,7 +34,8 @@ WRONG_RMS_MM, WRONG_TIP_MM = 0.15, 0.5
 DOUBTS = {
     "direction_doubtful", "clamp_doubtful", "rough_edges", "ragged_tip", "overexposed",
     "root_hidden", "clamp_at_border", "height_doubtful", "tip_goes_on",
-    "clamp_lines_differ", "other_rod", "width_mismatch", "colour_mismatch",
+    "clamp_lines_differ", "other_rod", "width_mismatch", "width_uneven",
+    "colour_mismatch",
 }  # fmt: skip
 
 

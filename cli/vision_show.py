@@ -84,6 +84,8 @@ _EXPLAINED = {
     "calibrated",
     "width_mismatch": "the rod is not as wide as its specimen: another rod, or a hard "
     "shade was measured with it",
+    "width_uneven": "the rod is not as wide all along: a shade as dark as itself may "
+    "be measured with it where they lie side by side; light it from more sides",
     "colour_mismatch": "what was measured has another colour than the specimen: its "
     "shade, or another thing; look at the overlay",
     "tag_differs": "the tag and the rod itself tell different clamps: the tag came "

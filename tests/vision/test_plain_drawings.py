@@ -135,6 +135,12 @@ def test_a_front_that_is_blurred_into_its_shade_is_in_doubt(deep):
     assert (abs(found.clamp_px[0] - ROOT[0]) < 1.5) == (deep == 0.0)
 
 
+def test_a_tip_ends_where_a_shade_as_dark_as_itself_nearly_begins():
+    """It keeps 0.15 of the light, straight ahead: the rod was 1.3 mm too long."""
+    found = measured(rod=BLACK, turn_deg=1.0, shade_px=(26, 0), deep=0.85)
+    assert np.hypot(*(found.tip_px - axis(1.0)[0][-1])) < 1.0
+
+
 def test_a_black_rod_ends_before_its_deep_shade():
     shade_px = (12.0 * np.cos(np.radians(40.0)), 12.0 * np.sin(np.radians(40.0)))
     found = measured(rod=BLACK, turn_deg=40.0, shade_px=shade_px, deep=0.69)

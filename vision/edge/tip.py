@@ -28,9 +28,12 @@ Image = NDArray[np.float32]
 
 _SHARE = 0.62
 """Part of the width that the lanes cover: clear of blurred or rounded corners."""
-_SHADE = 0.15
-"""Light, over paper's above the rod's, that is half way to the deepest shade on paper:
-it keeps 0.3 of the light."""
+_SHADE, _DEEPEST = 0.15, 0.03
+"""Light, over paper's above the rod's, that is half way to a deep shade on paper, and
+to the deepest that can be told from the rod."""
+_LEVEL, _FLAT = 2.0, 0.4
+"""How far before an end the level of a shade is looked at, in what its blur reaches;
+and by how much of itself it may vary there, which a blurred end does by more."""
 _STEP_SIDE_PX, _SOFTER, _FACE_SEEN = 2.0, 1.8, 1.3
 """How far about a place its slope is looked for; how much less steep a shade ends than
 its rod; and how much more of an end face may be seen than its width tells."""
@@ -120,14 +123,24 @@ def _rough_end(
     if not hits.size:
         return None
     end = float(s[hits[0]])
-    dark = np.flatnonzero((light < _SHADE) & within & (s < end))
+    least = _half_way(light[(s < end - near) & (s > end - near - _LEVEL * near)])
+    dark = np.flatnonzero((light < least) & (s < end))
     shade = float(s[dark[-1] + 1] if dark.size else s[within][0])
-    if light[np.searchsorted(s, shade - near)] > 0.5 * _SHADE:
+    if light[np.searchsorted(s, shade - near)] > 0.5 * least:
         return end  # paler little by little, as a tail that tapers: no shade
     if face is None:
         soft = _SOFTER * _rise(light, s, end) < _rise(light, s, shade)
         face = 0.0 if soft else inner
     return shade if end - shade > near + _FACE_SEEN * face else end
+
+
+def _half_way(before: Array) -> float:
+    """Return half of the level right before an end, if there is one; else `_SHADE`."""
+    if len(before) < 2:
+        return _SHADE
+    low, level, high = np.quantile(before, [0.1, 0.5, 0.9])
+    deep = _DEEPEST < 0.5 * level < _SHADE and high - low < _FLAT * level
+    return float(0.5 * level) if deep else _SHADE
 
 
 def _rise(light: Array, s: Array, place: float) -> float:

@@ -21,6 +21,7 @@ from ..picture.photo import Photo
 from .beyond_ends import check_ends, goes_on_after_gap, tip_goes_on
 from .crossing import over_paper
 from .deviations import scale_sd
+from .one_width import is_uneven
 from .refine import Refined
 from .root import HIDDEN_MM, root_hidden
 from .setting import Setting
@@ -181,6 +182,8 @@ def doubts(
         flags.append("ragged_tip")
     if _length_is_off(result, setting):
         flags.append("length_mismatch")
+    if not refined.rough and is_uneven(result):
+        flags.append("width_uneven")
     if _side_is_off(result, setting):
         flags.append("width_mismatch")
     if setting.colour and _colour_is_off(photo, refined, setting.colour):

@@ -1,0 +1,35 @@
+"""A shade as dark as its rod shows in how the width changes with direction."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from magbend.vision.extraction.one_width import is_uneven
+from magbend.vision.measurement import Measurement
+
+N = 80
+THETA = np.linspace(0.0, 1.4, N)
+
+
+def rod(width):
+    """Return a bent rod 400 px long, measured with a width in px."""
+    step = 400.0 / N * np.column_stack([np.cos(THETA), np.sin(THETA)])
+    x, y = np.cumsum(step, axis=0).T
+    points = {
+        "x_px": x, "y_px": y, "theta_rad": THETA, "good": np.ones(N),
+        "width_mm": np.full(N, np.nan), "width_px": np.broadcast_to(width, N),
+    }  # fmt: skip
+    return Measurement(status="ok", points=points, width_px=float(np.median(width)))
+
+
+@pytest.mark.parametrize("towards_deg", [0.0, 60.0, 150.0])
+def test_rod_and_shade_as_one_are_wider_the_more_it_turns_from_their_shift(towards_deg):
+    both = 20.0 + 12.0 * np.abs(np.sin(THETA - np.radians(towards_deg)))
+    assert is_uneven(rod(both))
+
+
+def test_an_even_rod_a_taper_and_a_little_noise_are_no_doubt():
+    noise = np.random.default_rng(0).normal(0.0, 0.3, N)
+    assert not is_uneven(rod(20.0 + noise))
+    assert not is_uneven(rod(np.linspace(24.0, 14.0, N)))
