@@ -210,6 +210,23 @@ def test_a_bar_as_wide_and_as_dark_is_not_taken_for_the_rod_it_crosses():
     is_measured(drawn(rod=BLACK, turn_deg=80.0, over=[over]), 80.0)
 
 
+def test_a_sharp_bend_is_no_crossing():
+    """A worm turns in a radius of one width."""
+    theta = np.pi * np.clip(np.linspace(-2.0, 3.0, 500), 0.0, 1.0)
+    points = ROOT + np.cumsum(0.8 * np.column_stack([np.cos(theta), np.sin(theta)]), 0)
+    aside = 0.5 * WIDTH * np.column_stack([-np.sin(theta), np.cos(theta)])
+    body = (BLACK, np.vstack([points + aside, (points - aside)[::-1]]))
+    photo = drawn(rod=(0.7,) * 3, turn_deg=0.0, clamp=0.7, over=[body])
+    found = extract(photo, SCALE, rod_height_mm=0.0, clamp="none")
+    assert found.ok, found.reason
+    assert found.length_px == pytest.approx(400.0, abs=4.0)
+
+
+def test_a_shade_nearly_as_dark_is_no_second_rod():
+    photo = drawn(rod=(0.17,) * 3, turn_deg=60.0, shade_px=(-30, 45), deep=0.6)
+    is_measured(photo, 60.0)
+
+
 def test_a_rod_that_ends_at_a_bar_is_refused():
     points, theta = axis(30.0)
     over = (BLACK, bar(points[-1], np.degrees(theta[-1]) + 90.0, 200, WIDTH))

@@ -76,6 +76,12 @@ class Candidate:
         """Distance of a point (x, y) from the start curve, px."""
         return float(np.hypot(*(self.points_px - point).T).min())
 
+    def from_tip(self, along: Array) -> Array:
+        """Return points at distances from its tip along it, px, shape (n, 2)."""
+        points = self.points_px[::-1]
+        s = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
+        return np.column_stack([np.interp(along, s, axis) for axis in points.T])
+
     def lies_on(self, other: Candidate) -> bool:
         """Whether its middle lies on another: a part of it, or the same thing."""
         middle = self.points_px[len(self.points_px) // 2]

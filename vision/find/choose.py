@@ -29,8 +29,9 @@ _NO_CLAMP = (
 _SIZE = 1.6
 """Factor by which a thing may be larger or smaller than the rod that is sought."""
 
-_TOLD = 0.2
-"""By how much better, as a logarithm, a rod of known size must fit than another."""
+_TOLD, _HINTED = 0.2, 0.1
+"""By how much better, as a logarithm, a rod of known size must fit than another: so
+that there is no doubt, and so that it is measured in doubt."""
 
 _AS_CLEAR = 0.6
 """Share of the levels, and of the worth, at which another thing is as likely."""
@@ -38,6 +39,9 @@ _AS_CLEAR = 0.6
 _AS_LONG = 0.6
 """Length over the rod's from which another thing cannot be told from it; a shorter one
 is a doubt."""
+
+_PALER_COPY = 0.04
+"""How much paler than the rod, of the paper's light, a deep shade of it may be."""
 
 _DARK = 0.25
 """Light of a rod, over the paper's, that no mix of colours tells much better."""
@@ -96,9 +100,9 @@ class Sought:
         pairs = ((rod.width_px, self.width_px), (rod.length_px, self.length_px))
         return sum(abs(math.log(seen / known)) for seen, known in pairs if known)
 
-    def tells(self, rod: Candidate, other: Candidate) -> bool:
-        """Whether the size tells that it is this candidate and not another."""
-        return self.misfit(rod) + _TOLD < self.misfit(other)
+    def tells(self, rod: Candidate, other: Candidate, by: float) -> bool:
+        """Whether it is this candidate and not another, by so much of its size."""
+        return self.misfit(rod) + by < self.misfit(other)
 
 
 def find_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
@@ -149,28 +153,7 @@ def search_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
     if not things:
         raise LostError("no_rod", "nothing in the picture is long and thin like a rod")
     seen = [thing.best.points_px for thing in things[:_SHOWN]]
-    own = [
-        thing
-        for thing in things
-        if not any(_is_shade(thing.best, other.best) for other in things)
-    ]
-    held = [thing for thing in own if thing.best.root != "free"]
-    first = own[0]
-    if held and sought.clamp != "none" and held[0].worth > _AS_CLEAR * first.worth:
-        first = held[0]
-    first = min(
-        [first, *_all_rivals(first, things)], key=lambda item: sought.misfit(item.best)
-    )
-    rivals = [
-        other.best
-        for other in _all_rivals(first, things)
-        if not sought.tells(first.best, other.best)
-    ]
-    halved = any(_are_halves(first.best, other.best) for other in things)
-    rod = replace(first.best, rivalled=bool(rivals), halved=halved)
-    alike = [other for other in rivals if other.length_px > _AS_LONG * rod.length_px]
-    if alike:
-        raise _too_many([rod, *alike], seen)
+    rod = _standing_out(things, sought, seen)
     if rod.root == "free" and sought.clamp != "none":
         raise LostError("no_clamp", _NO_CLAMP, seen)
     try:
@@ -189,6 +172,42 @@ def search_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
     return rod, view
 
 
+def _standing_out(things: list[Thing], sought: Sought, seen: list[Array]) -> Candidate:
+    """Return the rod among the things of a picture, the likeliest first."""
+    own = [
+        thing
+        for thing in things
+        if not any(
+            _is_shade(thing.best, other.best) or _is_paler_copy(thing.best, other.best)
+            for other in things
+        )
+    ]
+    held = [thing for thing in own if thing.best.root != "free"]
+    first = own[0]
+    if held and sought.clamp != "none" and held[0].worth > _AS_CLEAR * first.worth:
+        first = held[0]
+    first = min(
+        [first, *_all_rivals(first, own)], key=lambda item: sought.misfit(item.best)
+    )
+    rivals = [
+        other.best
+        for other in _all_rivals(first, things)
+        if not sought.tells(first.best, other.best, _TOLD)
+    ]
+    halved = any(_are_halves(first.best, other.best) for other in things)
+    rod = replace(first.best, rivalled=bool(rivals), halved=halved)
+    alike = [
+        other
+        for other in rivals
+        if other.length_px > _AS_LONG * rod.length_px
+        and not sought.tells(rod, other, _HINTED)
+        and not _is_paler_copy(other, rod)
+    ]
+    if alike:
+        raise _too_many([rod, *alike], seen)
+    return rod
+
+
 def _compare_colours(photo: Photo, colour: str, things: list[Thing]) -> None:
     """Note how far the colour of each thing, as seen at each level, is from one."""
     distance = distance_from(photo, colour)
@@ -205,6 +224,19 @@ def _is_shade(one: Candidate, rod: Candidate) -> bool:
     alike = 0.4 < one.length_px / rod.length_px < 2.0
     away = [rod.away(point) for point in one.points_px[:: len(one.points_px) // 8 + 1]]
     return alike and max(away) < _BESIDE * rod.width_px
+
+
+def _is_paler_copy(one: Candidate, rod: Candidate) -> bool:
+    """Whether a thing is paler than another and its copy beside it, as a shade is."""
+    if one.ratio < rod.ratio + _PALER_COPY:
+        return False
+    alike = 0.8 < one.length_px / rod.length_px < 1.25
+    if not alike or not 0.7 < one.width_px / rod.width_px < 1.4:
+        return False
+    # From the tips on: the root of a shade may lie in that of the clamp.
+    along = np.linspace(0.0, 0.9 * min(one.length_px, rod.length_px), 12)
+    moved = one.from_tip(along) - rod.from_tip(along)
+    return bool(np.hypot(*(moved - moved.mean(axis=0)).T).max() < rod.width_px)
 
 
 def _are_halves(one: Candidate, other: Candidate) -> bool:
@@ -269,7 +301,9 @@ def _choose(binary: Binary, sought: Sought) -> Candidate:
             continue
         rod = _likeliest(rods)
         rod = min([rod, *_alike(rod, rods)], key=sought.misfit)
-        others = [other for other in _alike(rod, rods) if not sought.tells(rod, other)]
+        others = [
+            other for other in _alike(rod, rods) if not sought.tells(rod, other, _TOLD)
+        ]
         if others:
             seen = [item.points_px for item in [rod, *others][:_SHOWN]]
             raise _too_many([rod, *others], seen)

@@ -18,8 +18,8 @@ from .track import predict
 
 Array = NDArray[np.float64]
 
-_ARM = 3
-"""Levels, each half a width, that an arm is longer than; what is less is a rag."""
+_ARM, _ARM_PX = 3, 6.0
+"""Levels, each half a width, and pixels that an arm is longer than; less is a rag."""
 
 _AHEAD, _RECENT = 7, 12
 """Levels ahead at which an arm is compared with where the curve leads, and levels
@@ -69,7 +69,7 @@ class Way:
     barred: bool
 
 
-def straight_on(sets: LevelSets, light: Array) -> Way:
+def straight_on(sets: LevelSets, light: Array, touching: set[int]) -> Way:
     """Follow a thing from its root through the parts of its level sets.
 
     Parameters
@@ -78,6 +78,9 @@ def straight_on(sets: LevelSets, light: Array) -> Way:
         The parts.
     light : ndarray, shape (n,)
         Light at their centres, over the paper's.
+    touching : set of int
+        Parts that touch something thick, as a crossing is: at a corner there the way
+        leads round into what crosses the thing.
     """
     after, height = _tree(sets)
     roots = np.flatnonzero(sets.level == 0)
@@ -85,9 +88,10 @@ def straight_on(sets: LevelSets, light: Array) -> Way:
     crossed: list[tuple[int, int]] = []
     passed: list[int] = []
     barred = False
+    least = max(_ARM, int(_ARM_PX / sets.step))
     while after[way[-1]]:
         at = way[-1]
-        if sum(height[part] >= _ARM for part in after[at]) < 2:
+        if sum(height[part] >= least for part in after[at]) < 2:
             way.append(_highest(after[at], height))
             continue
         arms = _ways_from(at, sets, after)
@@ -99,7 +103,7 @@ def straight_on(sets: LevelSets, light: Array) -> Way:
         crossed.append((len(way) - 1, len(way) + _branches(arm, after, height)))
         way.extend(arm)
     corner = _corner(sets.centres[way])
-    if corner is not None and not any(k <= corner <= m + 2 for k, m in crossed):
+    if corner is not None and not touching.isdisjoint(_near(way, corner)):
         passed.append(way[-1])
         way, barred = way[: max(corner - _LAG // 2, 1)], True
         crossed = [(k, m) for k, m in crossed if m < corner]
@@ -116,6 +120,10 @@ def _corner(centres: Array) -> int | None:
     if max(turns, default=0.0) < _SHARP:
         return None
     return int(np.argmax(turns)) + _LAG
+
+
+def _near(way: list[int], place: int) -> list[int]:
+    return way[max(place - _LAG, 1) : place + _LAG + 1]
 
 
 def _tree(sets: LevelSets) -> tuple[list[list[int]], NDArray[np.intp]]:

@@ -53,7 +53,9 @@ def traced(
         if sets is None:
             return False
         x, y = np.rint(sets.centres + place).astype(int).T
-        way = straight_on(sets, np.asarray(binary.ratio[y, x], np.float64))
+        light = np.asarray(binary.ratio[y, x], np.float64)
+        touching = {int(part) for mask in held for part in sets.parts_at(mask)}
+        way = straight_on(sets, light, touching)
         if len(way.points) < 2:
             return way.branched
         at_clamp, at_border = (
