@@ -14,6 +14,7 @@ from ..picture.photo import Photo
 from .binarise import Binary, binarise, rebinarise
 from .candidate import Candidate
 from .ground import FAINT, LEVELS, View, best_view, ground_distance
+from .lines import without_lines
 from .rod import LEAST_SHARE, find_candidates
 from .rod_colour import ALIKE, distance_from
 from .things import Thing, find_things
@@ -136,12 +137,27 @@ def find_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
 def search_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
     """Return the rod as all levels of lightness and colour together show it.
 
+    On squared paper that is looked for without its lines first.
+
     Raises
     ------
     LostError
         If there is none, or another as likely, with the axes of what was seen.
     """
     binary = ground_distance(photo)
+    unlined = without_lines(binary)
+    if unlined is None:
+        return _search(photo, sought, binary)
+    try:
+        return _search(photo, sought, unlined)
+    except LostError as lost:
+        if lost.flag != "no_rod":
+            raise
+    return _search(photo, sought, binary)
+
+
+def _search(photo: Photo, sought: Sought, binary: Binary) -> tuple[Candidate, View]:
+    """Return the rod that the levels of one picture show."""
     least = LEAST_LENGTH * binary.factor * float(np.hypot(*binary.mask.shape))
     things = find_things(binary, [1.0 - level for level in LEVELS], least)
     if not things:

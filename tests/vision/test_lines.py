@@ -1,0 +1,69 @@
+"""A rod on a cutting mat: its lines are not things, whatever their colour."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from magbend.vision import as_photo
+from magbend.vision.find.choose import Sought, search_rod
+from magbend.vision.find.ground import ground_distance
+from magbend.vision.find.lines import without_lines
+
+MAT, PALE, WHITE = (0.08, 0.25, 0.09), (0.45, 0.6, 0.45), (0.7, 0.7, 0.7)
+SKY, DARK = (0.6, 0.45, 0.25), (0.03, 0.05, 0.04)
+
+
+def mat(*, rod, line, lines_px=3, pitch_px=33, clamp=WHITE):
+    """Return a mat with squares, turned by 12 degrees, and a bent rod of 22 px."""
+    light = np.empty((500, 800, 3), np.float32)
+    light[:] = MAT
+    turn = np.radians(12.0)
+    across = np.array([-np.sin(turn), np.cos(turn)])
+    for normal in (across, np.array([np.cos(turn), np.sin(turn)])):
+        along = 2000.0 * np.array([-normal[1], normal[0]])
+        for k in range(-60, 60):
+            ends = [pitch_px * k * normal + side * along for side in (-1.0, 1.0)]
+            (x, y), (u, v) = np.rint(16.0 * np.array(ends)).astype(int).tolist()
+            cv2.line(light, (x, y), (u, v), line, lines_px, cv2.LINE_AA, 4)
+    theta = np.radians(70.0) * np.linspace(0.0, 1.0, 200)
+    steps = 1.9 * np.column_stack([np.cos(theta), np.sin(theta)])
+    axis = np.array([200.0, 130.0]) + np.cumsum(steps, axis=0)
+    fixed = np.rint(16.0 * axis).astype(np.int32).reshape(-1, 1, 2)
+    cv2.polylines(light, [fixed], False, rod, 22, cv2.LINE_AA, 4)
+    cv2.rectangle(light, (80, 50), (200, 210), clamp, -1)
+    light = cv2.GaussianBlur(light, (0, 0), 0.9)
+    light += np.random.default_rng(4).normal(0.0, 0.004, light.shape)
+    code = 255.0 * (1.055 * np.clip(light, 0.004, 1.0) ** (1 / 2.4) - 0.055)
+    return as_photo(np.rint(code).astype(np.uint8)), axis
+
+
+@pytest.mark.parametrize("rod", [SKY, DARK], ids=["pale", "dark"])
+@pytest.mark.parametrize(
+    ("line", "wide", "pitch"), [(PALE, 3, 33), (DARK, 2, 33), (PALE, 6, 60)]
+)
+def test_a_rod_is_found_on_a_cutting_mat(rod, line, wide, pitch):
+    photo, axis = mat(rod=rod, line=line, lines_px=wide, pitch_px=pitch)
+    found, _ = search_rod(photo, Sought())
+    aside = [np.hypot(*(axis - point).T).min() for point in found.points_px]
+    assert max(aside) < 6.0
+    assert found.length_px == pytest.approx(380.0, rel=0.08)
+    assert found.root == "clamp"
+
+
+def test_a_plain_ground_has_no_lines_and_a_scale_is_none():
+    photo, _ = mat(rod=SKY, line=MAT)
+    assert without_lines(ground_distance(photo)) is None
+    ticked = (255.0 * photo.grey).astype(np.uint8)
+    ticked[380:400, ::12] = 0
+    assert without_lines(ground_distance(as_photo(ticked))) is None
+
+
+def test_what_is_wider_than_the_lines_stays_as_wide():
+    photo, axis = mat(rod=SKY, line=PALE)
+    before = ground_distance(photo)
+    after = without_lines(before)
+    x, y = np.rint(axis[20:-20]).astype(int).T
+    assert np.abs(after.ratio - before.ratio)[y, x].max() < 0.1
+    assert (after.ratio > 0.93).mean() > 0.75 > (before.ratio > 0.93).mean() + 0.05

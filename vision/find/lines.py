@@ -1,0 +1,61 @@
+"""The lines of squared paper and cutting mats, taken out of the picture searched.
+
+They are thinner than the rod, and everywhere: of clutter, even of a scale's ticks, only
+a part of the picture is full. A closing by a disc a little wider than they are leaves
+what is wider. Edges are measured in the photograph itself, lines and all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from .binarise import Binary
+
+Image = NDArray[np.float32]
+
+_DISCS = 3, 5, 7, 9, 13, 17
+"""Diameters of discs that lines are thinner than, px of the working picture."""
+
+_SEEN, _TILES = 0.07, 8
+"""Distance from the paper of a line that matters; and tiles along either side."""
+
+_FULL, _EVERYWHERE = 0.03, 0.5
+"""Part of a tile that lines cover; and share of the tiles that have some."""
+
+_LEFT = 0.12
+"""Part of the lines that a disc may leave: then a larger one is needed."""
+
+
+def without_lines(binary: Binary) -> Binary | None:
+    """Return the picture without the lines of its ground; None where it has none.
+
+    Parameters
+    ----------
+    binary : Binary
+        The picture; its `ratio` is 1 on the ground, and less on lines and things.
+    """
+    covered = [_covered(binary.ratio, disc) for disc in (_DISCS[0], _DISCS[-1])]
+    if float(np.mean(covered[1] > _FULL)) < _EVERYWHERE:
+        return None
+    most = float(np.median(covered[1]))
+    for disc in _DISCS:
+        if float(np.median(_covered(binary.ratio, disc))) > (1.0 - _LEFT) * most:
+            break
+    return replace(binary, ratio=_closed(binary.ratio, disc + 2))
+
+
+def _closed(ratio: Image, disc: int) -> Image:
+    """Return the picture without what is thinner than a disc."""
+    kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (disc, disc))
+    return np.asarray(cv2.morphologyEx(ratio, cv2.MORPH_CLOSE, kernel))
+
+
+def _covered(ratio: Image, disc: int) -> NDArray[np.float64]:
+    """Return the part of each tile that is thinner than a disc."""
+    thin = (_closed(ratio, disc) - ratio > _SEEN).astype(np.float32)
+    tiles = cv2.resize(thin, (_TILES, _TILES), interpolation=cv2.INTER_AREA)
+    return np.asarray(tiles, np.float64)
