@@ -141,6 +141,18 @@ def test_a_tip_ends_where_a_shade_as_dark_as_itself_nearly_begins():
     assert np.hypot(*(found.tip_px - axis(1.0)[0][-1])) < 1.0
 
 
+@pytest.mark.parametrize("deep", [0.0, 0.58])
+def test_a_clamp_whose_front_is_more_blurred_than_its_rod_is_in_doubt(deep):
+    """Its short shade straight ahead moves no side of the rod, but the root by 6 px."""
+    found = measured(
+        rod=BLACK, turn_deg=15.0, shade_px=(4.8, -2.3), deep=deep, clamp=0.05,
+        blur_px=2.3,
+    )  # fmt: skip
+    off_mm = abs(found.clamp_px[0] - ROOT[0]) / 20.0
+    assert (off_mm > 0.2) == ("clamp_doubtful" in found.flags) == (deep > 0.0)
+    assert off_mm < max(0.04, 2.0 * found.clamp_sd_mm)
+
+
 def test_a_black_rod_ends_before_its_deep_shade():
     shade_px = (12.0 * np.cos(np.radians(40.0)), 12.0 * np.sin(np.radians(40.0)))
     found = measured(rod=BLACK, turn_deg=40.0, shade_px=shade_px, deep=0.69)

@@ -26,6 +26,9 @@ STEP_PX = 0.5
 SPAN = 5.5
 """So many blurs of paper are fitted: fewer leave its slope in doubt, and shade is
 straight no farther."""
+LINE_SIGMA, LINE_BLUR = 1.9, 0.025
+"""Standard deviation of a place that a line tells: of what its crossings scatter, were
+they independent, and of its blur."""
 _SHARPER, _SOFTER = 0.7, 2.5
 """By how much an end may be sharper, or softer, than was expected."""
 _ROUNDS, _ROUNDS_OWN = 3, 4
@@ -65,6 +68,11 @@ class EndFace:
     rise: float = 0.0
     blur: float = 0.0
     skew_sd: float = 0.0
+
+    @property
+    def place_sd(self) -> float:
+        """Standard deviation of the place, px: shade moves neighbouring lanes alike."""
+        return math.hypot(LINE_SIGMA * self.sigma, LINE_BLUR * self.blur)
 
 
 def lanes(

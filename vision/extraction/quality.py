@@ -23,7 +23,7 @@ from .crossing import over_paper
 from .deviations import scale_sd
 from .one_width import is_uneven
 from .refine import Refined
-from .root import HIDDEN_MM, root_hidden
+from .root import HIDDEN_MM, root_hidden, smeared_px
 from .setting import Setting
 from .strip import Strip
 
@@ -59,10 +59,10 @@ BLURRED_PX, BLURRED = 1.8, 0.08
 SHADE_PX = 0.04
 """Pull of a shade on the midline, before correction, above which it is named."""
 
-UNRESOLVED, HARD_SHADE, SMEARED = 0.21, 0.025, 1.4
-"""Blur, in widths, above which a clamp's front and its shade are seen as one line: an
-edge then takes half the rod's width to rise. With less they may be, where a shade pulls
-by so many widths, and the line is so much more blurred than the rod."""
+UNRESOLVED, SMEARED = 0.21, 0.075
+"""Blur, in widths, above which a clamp's front and its shade are seen as one line where
+shade pulls: an edge then takes half the rod's width to rise. Or by which that line is
+more blurred than the rod and its tip."""
 
 
 def refusal(
@@ -193,11 +193,11 @@ def doubts(
 
 def _front_in_shade(refined: Refined, pull: float) -> bool:
     """Whether a clamp's front and its shade may be blurred into one line."""
-    if refined.clamp is None or pull < SHADE_PX:
+    if refined.clamp is None:
         return False
-    smeared = refined.clamp.blur > SMEARED * refined.blur
     width = refined.typical_width
-    return refined.blur > UNRESOLVED * width or (pull > HARD_SHADE * width and smeared)
+    smeared = smeared_px(refined, refined.clamp.blur) > SMEARED * width
+    return smeared or (pull > SHADE_PX and refined.blur > UNRESOLVED * width)
 
 
 def _length_is_off(result: Measurement, setting: Setting) -> bool:

@@ -23,11 +23,11 @@ from .setting import UNKNOWN_CLAMP_MM, Setting
 HIDDEN_MM = 0.05
 """What part of the root a clamp of unknown height may hide before that is named."""
 
-LINE_BLUR, LINE_SCATTER, BORDER_PX, CARRIED, BETWEEN = 0.025, 0.7, 0.3, 0.01, 0.15
-"""Standard deviation of a place that a line tells: in its blurs, and in the scatter of
-its crossings, which shade makes; px, of where a rod enters the picture; and as shares
-of how far a line is carried to the height of the axis, and two lines are apart."""
-
+BORDER_PX, CARRIED, BETWEEN, SMEARED = 0.3, 0.01, 0.15, 1.3
+"""Standard deviation of a place: px, of where a rod enters the picture; as shares of
+how far a line is carried to the height of the axis, of how far two lines are apart, and
+of what blurs a line more than the rod's sides and its tip: the front of a shade, seen
+as one line with the clamp's (errors of 0.6 to 2 times that on drawings)."""
 
 _STEP_PX = 20.0
 """Length over which lines are taken for straight."""
@@ -84,7 +84,8 @@ def root_place(
         hidden = hidden_px(refined, setting, rise) / math.sqrt(3.0)
         place, line = _hidden_root(refined, ends, setting), front or face
         carried = 0.0 if line is None else place - line.s
-        return RootPlace(s=place, sd=_sd(line, carried, hidden), hidden=hidden)
+        sd = _sd(refined, line, carried, hidden)
+        return RootPlace(s=place, sd=sd, hidden=hidden)
     seen_at, axis_mm = [], setting.axis_height_mm
     if face is not None:
         seen_at.append(_below(refined, face, axis_mm + 0.5 * height_mm, setting))
@@ -95,22 +96,34 @@ def root_place(
     if face is None or front is None:
         line = front or face
         carried = 0.0 if line is None else seen_at[0] - line.s
-        return RootPlace(s=seen_at[0], sd=_sd(line, carried))
+        return RootPlace(s=seen_at[0], sd=_sd(refined, line, carried))
     apart, carried = seen_at[1] - seen_at[0], seen_at[1] - front.s
     if abs(apart) <= APART_PX:
         place = between(seen_at[0], seen_at[1], refined.clamp)
         clear = max(face, front, key=lambda line: line.rise)
-        return RootPlace(s=place, sd=_sd(clear, carried, BETWEEN * apart), apart=apart)
+        sd = _sd(refined, clear, carried, BETWEEN * apart)
+        return RootPlace(s=place, sd=sd, apart=apart)
     if is_face(apart, setting.face_px(refined.fit.curve)):
-        return RootPlace(s=seen_at[1], sd=_sd(front, carried))
+        return RootPlace(s=seen_at[1], sd=_sd(refined, front, carried))
     return RootPlace(s=seen_at[0], sd=0.5 * abs(apart), apart=apart)
 
 
-def _sd(line: EndFace | None, carried: float, other: float = 0.0) -> float:
+def _sd(
+    refined: Refined, line: EndFace | None, carried: float, other: float = 0.0
+) -> float:
     """Return the deviation of a place from a line that was carried so far, px."""
-    own = 0.0 if line is None else LINE_SCATTER * line.scatter
-    blur = 0.0 if line is None else LINE_BLUR * line.blur
-    return math.hypot(own, blur, CARRIED * carried, other)
+    own = 0.0 if line is None else line.place_sd
+    smeared = 0.0 if line is None else SMEARED * smeared_px(refined, line.blur)
+    return math.hypot(own, smeared, CARRIED * carried, other)
+
+
+def smeared_px(refined: Refined, blur: float) -> float:
+    """Return what blurs a line at the clamp more than the rod's sides or its tip, px.
+
+    What moved along the rod blurs the tip too.
+    """
+    usual = max(refined.blur, refined.tip.blur)
+    return math.sqrt(max(blur**2 - usual**2, 0.0))
 
 
 def root_hidden(refined: Refined, setting: Setting) -> bool:
