@@ -19,7 +19,7 @@ from ...core.jit import Kernel, once
 from ..curve.fit import _solution
 from ..curve.joints import _evidence, _model
 from ..curve.likelihood import penalised
-from ..curve.spline import _penalty
+from ..curve.spline import penalty_between
 from ..edge.edges import _measure_side, _sample
 from ..edge.rough_edges import _rough_edges
 from ..edge.step_line import _fit_line, _fit_step
@@ -43,7 +43,7 @@ PATIENCE = 5_000_000
 """Calls of kernels that a photograph may take in plain Python: some ten seconds."""
 
 _LATEST: tuple[Kernel, ...] = (
-    _solution, _evidence, _model, penalised, _penalty, _measure_side, _sample,
+    _solution, _evidence, _model, penalised, penalty_between, _measure_side, _sample,
     _rough_edges, _fit_line, _fit_step, _half_widths, resample,
 )  # fmt: skip
 """Kernels of every part of a measurement, the slowest to compile among them."""

@@ -26,7 +26,7 @@ from .cholesky import factor, inverse, solved, squared
 from .curve import Curve
 from .likelihood import penalised
 from .problem import SHARED, Problem, linearised, moved, parameters, pose
-from .spline import Smooth, penalty_on_moment
+from .spline import Smooth, penalty_between
 
 Array = NDArray[np.float64]
 
@@ -212,27 +212,17 @@ def solve(
     last : bool
         Whether it is the last step; before that, any fair weight will do.
     """
-    penalty, nullity = penalty_on_moment(
-        problem.knots, smooth, problem.s, problem.theta
+    ratios = np.array(smooth.ratios or (), dtype=np.float64)
+    shape, numbers, change, covariance, lever = _solution(
+        problem, smooth.order, ratios, strength, last
     )
-    change, covariance, freedom = _solution(
-        problem, penalty, strength, nullity + 1, last
-    )
-    points, theta, kappa, residual = moved(problem, change)
-    noise, correlation = _scatter(problem, residual, freedom)
-    basis, start = problem.basis, problem.basis.first[0] + 1
-    turn = covariance[:, start : start + 4] @ basis.value[0]
+    points, theta, kappa, residual = shape
+    noise, correlation, freedom = numbers
     return CurveFit(
         curve=Curve(s=problem.s, points=points, theta=theta, kappa=kappa),
-        residual=residual,
-        noise=noise,
-        correlation=correlation,
-        freedom=freedom,
-        problem=problem,
-        change=change,
-        covariance=covariance * (noise**2 * correlation / problem.shared),
-        lever=problem.jacobian @ turn * problem.weight / problem.shared,
-    )
+        residual=residual, noise=noise, correlation=correlation, freedom=freedom,
+        problem=problem, change=change, covariance=covariance, lever=lever,
+    )  # fmt: skip
 
 
 def _chord_angles(points: Array) -> Array:
@@ -242,18 +232,35 @@ def _chord_angles(points: Array) -> Array:
 
 @njit(cache=True)
 def _solution(
-    problem: Problem, penalty: Array, strength: float, free: int, last: bool
-) -> tuple[Array, Array, float]:
-    """Return the parameters, their covariance for unit noise, and how many count."""
+    problem: Problem, order: int, ratios: Array, strength: float, last: bool
+) -> tuple[
+    tuple[Array, Array, Array, Array], tuple[float, float, float], Array, Array, Array
+]:
+    """Return what `moved` does, noise, correlation and freedom, and a fit's arrays.
+
+    These are the parameters, their covariance, and the lever.
+    """
+    penalty, nullity = penalty_between(
+        problem.knots, order, ratios, problem.s, problem.theta
+    )
     total = np.sum(problem.weight * problem.residual**2) + problem.within
     strength, normal, right = penalised(
         problem.normal, problem.right, penalty, problem.coefficients, strength,
-        total / problem.shared, np.sum(problem.weight) / problem.shared, free, last,
+        total / problem.shared, np.sum(problem.weight) / problem.shared, nullity + 1,
+        last,
     )  # fmt: skip
     half = factor(normal)
     covariance = squared(inverse(half))
     freedom = len(normal) - strength * np.sum(penalty * covariance[1:, 1:])
-    return solved(half, right), covariance, freedom
+    change = solved(half, right)
+    shape = moved(problem, change)
+    noise, correlation = _scatter(problem, shape[3], freedom)
+    turn, basis = np.zeros(len(covariance)), problem.basis
+    for j in range(4):
+        turn += basis.value[0, j] * covariance[basis.first[0] + 1 + j]
+    lever = np.sum(problem.jacobian * turn, axis=1) * problem.weight / problem.shared
+    covariance *= noise**2 * correlation / problem.shared
+    return shape, (noise, correlation, freedom), change, covariance, lever
 
 
 @njit(cache=True)

@@ -146,18 +146,16 @@ def penalty_on_moment(
     M is a parabola between knots. The force F is the one that makes the integral least;
     the normals are those of a curve with angles theta at s.
     """
-    penalty, joints = _penalty(
-        knots, smooth.order, np.array(smooth.ratios or (), dtype=np.float64), s, theta
-    )
-    free = 3 if smooth.order == 2 else 4
-    return penalty, free + joints * (2 if smooth.ratios is None else 1)
+    ratios = np.array(smooth.ratios or (), dtype=np.float64)
+    found: tuple[Array, int] = penalty_between(knots, smooth.order, ratios, s, theta)
+    return found
 
 
 @njit(cache=True)
-def _penalty(
+def penalty_between(
     knots: Array, order: int, ratios: Array, s: Array, theta: Array
 ) -> tuple[Array, int]:
-    """Return the penalty and the number of joints; M is tied there if it has ratios."""
+    """Return what `penalty_on_moment` does; M is tied at joints that have ratios."""
     first, length, bend, slope_at_start, slope_at_end = _pieces(knots)
     count = first.size
     tie = np.zeros(count - 1)
@@ -186,7 +184,8 @@ def _penalty(
             0.5 * np.concatenate((length, length)), penalty,
         )  # fmt: skip
     _add_jumps(first, slope_at_end, slope_at_start, tie, penalty)
-    return penalty, joints
+    free = 3 if order == 2 else 4
+    return penalty, free + joints * (1 if ratios.size > 0 else 2)
 
 
 @njit(cache=True)

@@ -30,9 +30,9 @@ Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 
 _PASSES = 5
-_SEEKING_PASSES, _NEAR_PX = 2, 0.4
-"""At most so many passes only seek the rod, on every other station and with a supple
-curve; one that moves it by less is the last of them."""
+_NEAR_PX = 0.4
+"""The first pass, or the first two, only seek the rod: on every other station, with a
+supple curve. Two where the first moved it by more; its ends can wait."""
 _SURE_PX = 0.25
 """A start that is so sure need not be sought."""
 _STILL_PX, _ENDS_STILL_PX = 0.05, 0.15
@@ -193,8 +193,12 @@ def refine(
         shaded = np.interp(at, seen.s, seen.edges.shaded(state.blur))
         state.curve, state.half = fit.curve, 0.5 * width
         state.first, state.last = 0.0, float(fit.curve.s[-1])
+        sought, seeking = seeking, seeking and not turn and aside > _NEAR_PX
+        if seeking:
+            first, end = 0.0, state.last
+            continue
         # The ends of the curve as it is now: often they move when it does not.
-        later = turn + 1 if seeking else turn + 2
+        later = turn + 1 if sought else turn + 2
         tip, lines, first = find_ends(grey, state, seen, root, sign, later, walls)
         end = tip.s
         moved = abs(first) + abs(end - state.last)
@@ -202,10 +206,9 @@ def refine(
         if still_px == _STILL_PX and median(shaded) > _SHADED_PX:
             near_px = _SHADED_STILL_PX
         still = aside < near_px and moved < _ENDS_STILL_PX
-        settled = still and not seeking
+        settled = still and not sought
         if settled:
             break
-        seeking = seeking and turn + 1 < _SEEKING_PASSES and aside > _NEAR_PX
     curve = replace(fit.curve, s=fit.curve.s - first)
     white = saturated(seen, sign)
     return Refined(
