@@ -17,6 +17,7 @@ from .ground import FAINT, LEVELS, View, best_view, ground_distance
 from .lines import without_lines
 from .rod import LEAST_SHARE, find_candidates
 from .rod_colour import ALIKE, distance_from
+from .shadeless import without_shades
 from .things import Thing, find_things
 
 Array = NDArray[np.float64]
@@ -169,6 +170,9 @@ def _search(photo: Photo, sought: Sought, binary: Binary) -> tuple[Candidate, Vi
     if not things:
         raise LostError("no_rod", "nothing in the picture is long and thin like a rod")
     seen = [thing.best.points_px for thing in things[:_SHOWN]]
+    best = [thing.best for thing in things]
+    lit = {id(rod) for rod in without_shades(photo, best)}
+    things = [thing for thing, rod in zip(things, best, strict=True) if id(rod) in lit]
     rod = _standing_out(things, sought, seen)
     if rod.root == "free" and sought.clamp != "none":
         raise LostError("no_clamp", _NO_CLAMP, seen)

@@ -8,6 +8,7 @@ and shade are equally light, and the rod is not: the linear discriminant (R. A. 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import cv2
@@ -48,6 +49,9 @@ _DEEPEST, _COPY, _SHIFT = 0.1, 0.3, 0.05
 """Light that the deepest shade keeps of the paper's; by how much what lies beside a
 shade may wander from where its rod must be, in widths; and the part of a shift that
 must be seen across a rod, for what lies along it is not."""
+
+_SHIFTED, _ASTRAY = 6.0, 0.7
+"""How far a copy may be shifted, and wander from there, in widths."""
 
 _MISSING, _MISSING_PX, _UNEVEN = 0.03, 0.7, 0.06
 """Light of the paper that is missing beside a rod where it has a shade: as that of so
@@ -131,6 +135,54 @@ def in_lightness(photo: Photo, rod: Candidate, view: View) -> View:
 def _near(rod: Candidate) -> Array:
     reach = _ROOM * rod.width_px
     return np.vstack([rod.points_px - reach, rod.points_px + reach])
+
+
+def without_shades(photo: Photo, things: Sequence[Candidate]) -> list[Candidate]:
+    """Return things but for those without colour that are copies of a coloured one.
+
+    Parameters
+    ----------
+    photo : Photo
+        The photograph.
+    things : sequence of Candidate
+        What is long and thin in it.
+    """
+    paper = _paper_colour(photo)
+    if paper is None or len(things) < 2:
+        return list(things)
+    light = [np.asarray(photo.colour_at(thing.points_px)) for thing in things]
+    share = np.array([np.median(each, axis=0) / paper for each in light])
+    brightness = share.mean(axis=1)
+    hue = np.linalg.norm(share - brightness[:, None], axis=1)
+    grey = (hue < _COLOURED) & (brightness > _DEEPEST) & (brightness < 1.0)
+    return [
+        thing
+        for k, thing in enumerate(things)
+        if not grey[k]
+        or not any(
+            hue[i] > _COLOURED + hue[k] and _is_copy(thing, rod)
+            for i, rod in enumerate(things)
+        )
+    ]
+
+
+def _is_copy(one: Candidate, other: Candidate) -> bool:
+    """Whether two things are alike but for a shift, as far as both are seen."""
+    length = min(one.length_px, other.length_px)
+    if length < _ALL_ALONG * max(one.length_px, other.length_px):
+        return False
+    from_tip = np.linspace(0.0, 0.9 * length, 10)
+    shift = _from_tip(one, from_tip) - _from_tip(other, from_tip)
+    near = float(np.hypot(*np.median(shift, axis=0))) < _SHIFTED * other.width_px
+    astray = np.hypot(*(shift - np.median(shift, axis=0)).T)
+    return near and float(astray.max()) < _ASTRAY * other.width_px
+
+
+def _from_tip(thing: Candidate, s: Array) -> Array:
+    """Return points at arc lengths from a tip."""
+    points = thing.points_px[::-1]
+    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+    return np.column_stack([np.interp(s, along, axis) for axis in points.T])
 
 
 def _paper_colour(photo: Photo) -> Array | None:
