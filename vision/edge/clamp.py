@@ -33,6 +33,8 @@ Image = NDArray[np.float32]
 
 _LANES = np.linspace(-0.5, 0.5, 9)
 _BESIDE = np.linspace(0.5, 2.0, 13)
+_FACE_SEEN, _FRONT_SEEN = 0.6, 3.0
+"""Widths of the rod over which the two lines are seen."""
 _CLAMP_SPAN = 3.0
 """So many blurs of the clamp are fitted: its foot and the corner over the rod are dark,
 and only what lies right beside the line makes the step."""
@@ -74,12 +76,13 @@ class ClampLines:
 def between(first: float, second: float, lines: ClampLines) -> float:
     """Return a place between those that each of two lines tells.
 
-    What shade does to a line goes with the inverse of its step's height, and so does
-    the noise: the weight is the square of that.
+    What shade and grain do to a line goes with the inverse of its step's height, and is
+    alike on neighbouring lanes, whose scatter does not show it: the weight is the
+    square of that height, times how much of the line is seen.
     """
     face, front = lines.face, lines.front
-    a = 0.0 if face is None else face.rise**2
-    b = 0.0 if front is None else front.rise**2
+    a = 0.0 if face is None else _FACE_SEEN * face.rise**2
+    b = 0.0 if front is None else _FRONT_SEEN * front.rise**2
     return (a * first + b * second) / (a + b) if a + b > 0.0 else 0.5 * (first + second)
 
 
@@ -135,7 +138,7 @@ def _face(
     contrast: float, reach: float, sign: float, fine: bool,
 ) -> EndFace | None:  # fmt: skip
     near = clear_of(blur)
-    across = 0.6 * _LANES * width
+    across = _FACE_SEEN * _LANES * width
     light = np.ascontiguousarray(lanes(grey, curve, s, across, sign)[:, ::-1])
     place = _steepest(light, -s[::-1], -expected, reach, 0.12 * contrast)
     if np.isnan(place):
