@@ -222,6 +222,20 @@ def test_a_bar_as_wide_and_as_dark_is_not_taken_for_the_rod_it_crosses():
     is_measured(drawn(rod=BLACK, turn_deg=80.0, over=[over]), 80.0)
 
 
+def test_a_white_rod_in_a_black_clamp_on_a_dark_board_is_measured():
+    board = np.array([[-1.0, -1.0], [801.0, -1.0], [801.0, 501.0], [-1.0, 501.0]])
+    body = strip(40.0, -0.5, 0.5)
+    over = [((0.05,) * 3, board), ((0.8,) * 3, body), ((0.02,) * 3, CLAMP)]
+    is_measured(drawn(rod=RED, turn_deg=40.0, over=over), 40.0, "")
+
+
+def test_a_wire_to_the_border_is_not_where_the_rod_leaves_the_picture():
+    points, theta = axis(50.0)
+    wire = bar(points[200], np.degrees(theta[200]) + 80.0, 1500, 5)
+    photo = drawn(rod=RED, turn_deg=50.0, over=[((0.05,) * 3, wire)])
+    is_measured(photo, 50.0, "")
+
+
 def test_a_sharp_bend_is_no_crossing():
     """A worm turns in a radius of one width."""
     theta = np.pi * np.clip(np.linspace(-2.0, 3.0, 500), 0.0, 1.0)

@@ -55,8 +55,11 @@ _FORE = 1.0, 3.0
 _WIDE = 1.25
 """A body reaches so far to either side of the axis, in widths."""
 
-_OTHER = 0.12
-"""Its light differs from the paper's by more than this share of the rod's contrast."""
+_OTHER, _OTHER_DARK = 0.12, 0.3
+"""Its light differs from the paper's by more than this share of the rod's contrast; or,
+on a dark board, of the board's own light: a black clamp there is far from a pale rod,
+and so is the board.
+"""
 
 _BODY_PX = 4.0
 """How much of a body is looked at."""
@@ -114,7 +117,7 @@ def _on_paper(strips: list[Strip], refined: Refined) -> bool:
     What is seen in several colours is as far from the paper as all of them tell.
     """
     width = refined.typical_width
-    off, rod = [], []
+    off, rod, ground = [], [], []
     for strip in strips:
         sides = _sides(strip, refined)
         along = strip.between(0.0, refined.fit.curve.s[-1])
@@ -122,8 +125,11 @@ def _on_paper(strips: list[Strip], refined: Refined) -> bool:
         paper = quantile(sides[:, :, along].ravel(), 0.8)
         off.append(np.median(sides[:, :, behind], axis=(1, 2)) - paper)
         rod.append(paper - median(strip.lanes(0.0)[0, along]))
-    away = np.linalg.norm(off, axis=0)
-    return bool(np.all(away < _OTHER * np.linalg.norm(rod)))
+        ground.append(paper)
+    away, least = np.linalg.norm(off, axis=0), _OTHER * np.linalg.norm(rod)
+    if max(ground) < 0.0:  # of a light rod, light is counted downwards
+        least = min(least, _OTHER_DARK * np.linalg.norm(ground))
+    return bool(np.all(away < least))
 
 
 def _tip_at_body(strip: Strip, refined: Refined) -> bool:

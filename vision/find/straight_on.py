@@ -8,6 +8,7 @@ that lies where its curve leads.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import zip_longest
 
 import numpy as np
 from numpy.typing import NDArray
@@ -225,8 +226,8 @@ def _way(
     size = sets.size[parts]
     typical = median(size)
     if not (crossed or barred) and len(size) > 1 and size[-1] < 0.5 * typical:
-        parts, size = parts[:-1], size[:-1]
-    points = sets.centres[parts]
+        size = size[:-1]
+    points = sets.centres[parts[: len(size)]]
     bulged = size > _BULGED * typical
     kept, hidden = np.ones(len(points), np.bool_), []
     for first, last in crossed:
@@ -240,7 +241,9 @@ def _way(
         chord = points[high] - points[low]
         hidden.append([*(points[low] + 0.5 * chord), 0.5 * float(np.hypot(*chord))])
     return Way(
-        parts=[part for part, clear in zip(parts, kept, strict=True) if clear],
+        parts=[
+            part for part, bare in zip_longest(parts, kept, fillvalue=True) if bare
+        ],
         points=points[kept], hidden=np.reshape(hidden, (-1, 3)),
         passed=passed, branched=bool(crossed) or barred, barred=barred,
     )  # fmt: skip

@@ -59,7 +59,7 @@ def traced(
         if len(way.points) < 2:
             return way.branched
         at_clamp, at_border = (
-            [mask for mask in masks if not way.branched or _lies_on(mask, way, sets)]
+            [mask for mask in masks if mask is seeds or _lies_on(mask, way, sets)]
             for masks in (held, leaving)
         )
         part = _candidate(way, place, half, binary, root, len(at_clamp), len(at_border))
