@@ -172,17 +172,10 @@ def _is_copy(one: Candidate, other: Candidate) -> bool:
     if length < _ALL_ALONG * max(one.length_px, other.length_px):
         return False
     from_tip = np.linspace(0.0, 0.9 * length, 10)
-    shift = _from_tip(one, from_tip) - _from_tip(other, from_tip)
+    shift = one.from_tip(from_tip) - other.from_tip(from_tip)
     near = float(np.hypot(*np.median(shift, axis=0))) < _SHIFTED * other.width_px
     astray = np.hypot(*(shift - np.median(shift, axis=0)).T)
     return near and float(astray.max()) < _ASTRAY * other.width_px
-
-
-def _from_tip(thing: Candidate, s: Array) -> Array:
-    """Return points at arc lengths from a tip."""
-    points = thing.points_px[::-1]
-    along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    return np.column_stack([np.interp(s, along, axis) for axis in points.T])
 
 
 def _paper_colour(photo: Photo) -> Array | None:
