@@ -8,6 +8,10 @@ import pytest
 
 from magbend.vision import as_photo, extract
 from magbend.vision.camera.calibrate import calibrate_known_length
+from magbend.vision.extraction.extract import measure_candidate
+from magbend.vision.extraction.setting import Setting
+from magbend.vision.find.candidate import Candidate
+from magbend.vision.find.ground import View
 from magbend.vision.synthetic import signed_distance
 
 SIZE, FINE, WIDTH = (800, 500), 2, 20.0
@@ -290,6 +294,19 @@ def test_blur_moves_no_edge(rod, blur_px):
     aside = signed_distance(soft.points_px[1:-1], sharp.points_px)
     assert np.abs(aside).max() < 0.1
     assert np.hypot(*np.subtract(soft.tip_px, sharp.tip_px)) < 0.5
+
+
+def test_a_thin_rim_of_a_glossy_rod_tells_its_clamp_too():
+    over = [((0.5, 0.49, 0.8), strip(50.0, 0.25, 0.4))]
+    photo = drawn(rod=RED, turn_deg=50.0, clamp=0.08, over=over)
+    rim = Candidate(
+        points_px=strip(50.0, 0.45, 0.45)[:400], width_px=2.0, length_px=390.0,
+        root="clamp", contacts=1, ratio=0.3,
+    )  # fmt: skip
+    view = View(grey=photo.grey, sign=1.0)
+    glossy = measure_candidate(photo, Setting(calibration=SCALE), rim, view)
+    matt = measured(rod=RED, turn_deg=50.0, clamp=0.08)
+    assert np.hypot(*np.subtract(glossy.clamp_px, matt.clamp_px)) < 0.5
 
 
 def test_two_rods_side_by_side_are_doubted():

@@ -27,9 +27,9 @@ of an edge that is not straight."""
 WIDTH_BLUR, WIDTH_SHADE = 0.037, 0.6
 """Doubt of a width: in blurs, which are no Gaussian's, and the share of a shade's pull
 that is left in it."""
-WIDTH_FELT = 0.6
+WIDTH_FELT = 6.0
 """And in widths times the fourth power of the blur in widths: by so little do width and
-blur change a profile differently, when its edges feel each other."""
+blur change a profile differently, and so much is a lens out of focus no Gaussian."""
 FACE_SEEN, FACE_HIDDEN = 0.18, 0.02
 """Doubt of where an end is, in widths of its face where the camera sees it (it has
 another grey value than the top), or where its lower edge is hidden."""

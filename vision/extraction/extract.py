@@ -40,7 +40,7 @@ from .refine import Refined, refine
 from .setting import Setting
 from .specimen_frame import measurement
 from .streak import is_parted, whole_rod
-from .strip import along_candidate, along_rod, blur_of
+from .strip import Strip, along_candidate, along_rod, blur_of
 from .two_levels import rod_alone
 
 Array = NDArray[np.float64]
@@ -186,18 +186,20 @@ def measure_candidate(
         If there is nothing to vouch for.
     """
     strip = along_candidate(view, candidate)
-    blur, width, jump = blur_of(strip)
-    far = blur > max(FAR * width, WANDER * jump)
-    found = view
-    if far:  # no shade is hard
-        view = in_lightness(photo, candidate, view)
+    far, blur, width = _is_far(strip)
+    found, glossy = view, is_parted(strip)
+    if far or glossy:
+        # No shade is hard then; and a streak, which may leave a rim of the rod, has the
+        # colour of the paper.
+        view = in_lightness(photo, None if glossy else candidate, view)
     else:
         candidate, view = in_its_colour(photo, candidate, view)
     if view is not found:
         strip = along_candidate(view, candidate)
-    if is_parted(strip):
+    if glossy:
         view, candidate = whole_rod(view, candidate)
         strip = along_candidate(view, candidate)
+        far, blur, width = _is_far(strip)
     elif candidate.halved:
         candidate = replace(candidate, rivalled=True)
     grey, sign = view.grey, view.sign
@@ -223,6 +225,12 @@ def measure_candidate(
             "sides",
         )
     return result
+
+
+def _is_far(strip: Strip) -> tuple[bool, float, float]:
+    """Return whether a rod's edges feel each other in the blur; blur and width, px."""
+    blur, width, jump = blur_of(strip)
+    return blur > max(FAR * width, WANDER * jump), blur, width
 
 
 def finish(

@@ -115,21 +115,22 @@ def in_its_colour(photo: Photo, rod: Candidate, view: View) -> tuple[Candidate, 
     return rod, mixed(photo, _discriminant(light, tint, paper), 1.0, near)
 
 
-def in_lightness(photo: Photo, rod: Candidate, view: View) -> View:
+def in_lightness(photo: Photo, rod: Candidate | None, view: View) -> View:
     """Return the lightness that the colours about a rod have together.
 
     Parameters
     ----------
     photo : Photo
         The photograph.
-    rod : Candidate
-        The rod.
+    rod : Candidate or None
+        The rod; None for the whole picture.
     view : View
         The light in which it was found; the same if that was mixed, or has no colour.
     """
     if view.mix is not None:
         return view
-    return mixed(photo, LUMINANCE, view.sign, _near(rod))
+    near = None if rod is None else _near(rod)
+    return mixed(photo, LUMINANCE, view.sign, near)
 
 
 def _near(rod: Candidate) -> Array:
