@@ -34,8 +34,9 @@ _STATIONS = 60
 _ROOM = 11.0
 """How far about a rod its picture is looked at later, in widths."""
 
-_EVERY = 16
-"""Of so many pixels along and across, one tells the paper's colour."""
+_FEW, _EVERY = 4, 16
+"""One of so many stations tells whether there is any colour; and of so many pixels
+along and across, one tells the paper's."""
 
 _COLOURED, _CLEAR, _LIGHT = 0.05, 8.0, 1.6
 """How far a rod's colour is from the paper's, in shares of the light of each: at least,
@@ -89,10 +90,11 @@ def in_its_colour(photo: Photo, rod: Candidate, view: View) -> tuple[Candidate, 
         Without a shade it is the lightness that the colours have together.
     """
     points, normals, across = _lanes(rod)
-    light = photo.colour_at(points[:, None] + across[:, None] * normals[:, None])
-    paper = _paper_colour(photo)
-    if light is None or paper is None:
-        return rod, view
+    spots = points[:, None] + across[:, None] * normals[:, None]
+    paper, glance = _paper_colour(photo), photo.colour_at(spots[::_FEW, ::2])
+    if paper is None or glance is None or not _tinted(glance / paper).any():
+        return rod, view  # as most rods, at little cost
+    light = np.asarray(photo.colour_at(spots))
     share = light / paper
     tint = _tinted(share)
     band = _nearest_band(tint > 0.5, across)
