@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..curve.curve import Curve
 from ..curve.robust import median
 from .clamp import ClampLines, between, find_clamp, goes_on_at
+from .clamp_light import STEP, clamp_light
 from .edges import clear_of
 from .state import LostError, Root, Seen, State
 from .step_line import EndFace
@@ -65,8 +66,12 @@ def find_ends(
         return tip, None, _border_crossing(grey, curve)
     if root == "free":
         return tip, None, _other_end(grey, state, sign, outwards, reach)
-    lines = _clamp_lines(grey, state, seen, sign, turn)
-    if state.plain is not None:
+    lines = ClampLines(face=None, front=None)
+    if state.clamp_light is None:
+        lines = _clamp_lines(grey, state, seen, sign, turn)
+    if lines.face is None and lines.front is None:
+        lines = _in_own_light(state, turn)
+    elif state.plain is not None:
         lines = _with_front(lines, state.plain, state, seen, turn)
     state.clamp_blur = lines.blur
     return tip, lines, _first(lines, state.face_px)
@@ -102,6 +107,27 @@ def _clamp_lines(
     outer -= clear_of(state.blur) + _LAG_PX
     inner = between_places(low, outer, _SHADED * contrast)
     return lines if inner.face is None and inner.front is None else inner
+
+
+def _in_own_light(state: State, turn: int) -> ClampLines:
+    """Return the lines at a clamp that the light which shows the rod does not show."""
+    light, expected, reach = state.clamp_light, state.first, 0.3 * state.width + 3.0
+    if light is None and state.photo is not None:
+        light = clamp_light(state.photo, state.curve, state.first, state.width)
+        state.clamp_light = light
+        if light is not None:
+            expected, reach = light.root, 0.8 * state.width + 3.0
+    if light is None:
+        return ClampLines(face=None, front=None)
+
+    def seen_in(image: Image) -> ClampLines:
+        return find_clamp(
+            image, state.curve, expected=expected, width=state.width,
+            blur=state.clamp_blur or state.blur, contrast=STEP, reach=reach,
+            fine=turn >= _FINE,
+        )  # fmt: skip
+
+    return ClampLines(face=seen_in(light.rod).face, front=seen_in(light.paper).front)
 
 
 def _with_front(

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..curve.curve import Curve
+from ..picture.photo import Photo
+from .clamp_light import ClampLight
 from .edges import Edges
 from .flank import Flanks
 
@@ -43,6 +45,8 @@ class State:
     The blur of the ends, along the rod, is 0 as long as none was fitted; `blurs` is
     that of parts of its sides where it is uneven, as motion makes it on a bent rod.
     `plain` is the picture's own light where the rod is seen in a mix of colours.
+    `photo` has its colours, and `clamp_light` those that show a clamp where the light
+    that shows the rod does not.
     At the places `hidden` (x, y, radius) something lies across it.
     """
 
@@ -62,6 +66,8 @@ class State:
     clamp_blur: float = 0.0
     flanks: Flanks | None = None
     plain: NDArray[np.float32] | None = None
+    photo: Photo | None = None
+    clamp_light: ClampLight | None = None
 
 
 @dataclass(frozen=True, slots=True)

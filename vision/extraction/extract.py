@@ -300,7 +300,7 @@ def _refined(
         joints=setting.joints_px, walls=setting.walls_px if walls else None,
         face_px=setting.face_px(start.curve), sd_px=sd_px,
         known_joints=joints, plain=None if view.plain else photo.grey,
-        hidden_px=candidate.hidden_px,
+        hidden_px=candidate.hidden_px, photo=photo,
     )  # fmt: skip
     if start.blur > FAR * start.width:
         lost = refined.blur > TOO_FAR * refined.typical_width

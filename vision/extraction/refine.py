@@ -25,6 +25,7 @@ from ..edge.step_line import EndFace
 from ..edge.wall_light import Walls, to_wall_ends
 from ..edge.white import is_cut_off, saturated, to_whole_edges
 from ..find.track import FLARED, Start
+from ..picture.photo import Photo
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -122,6 +123,7 @@ def refine(
     sd_px: float = np.inf,
     known_joints: Array | None = None,
     plain: Image | None = None,
+    photo: Photo | None = None,
     hidden_px: Array | None = None,
 ) -> Refined:
     """Measure axis, edges and ends.
@@ -151,6 +153,8 @@ def refine(
     plain : ndarray, shape (height, width), float32, optional
         The picture's own light where `grey` is a mix of its colours: what a clamp that
         has no colour is seen in.
+    photo : Photo, optional
+        The photograph, whose colours may show a clamp that `grey` does not.
     hidden_px : ndarray, shape (k, 3), optional
         Places (x, y, radius) where something lies across the rod.
 
@@ -163,7 +167,7 @@ def refine(
     last = float(start.curve.s[-1])
     state = State(
         start.curve, half, start.width, 0.0, last, face_px, start.rough, start.blur,
-        hidden=hidden_px, plain=plain,
+        hidden=hidden_px, plain=plain, photo=photo,
     )  # fmt: skip
     seeking = sd_px > _SURE_PX
     seen = _look(grey, state, sign, 0, seeking=seeking)
