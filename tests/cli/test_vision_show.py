@@ -13,6 +13,7 @@ DOUBTS = [
     "direction_doubtful", "clamp_doubtful", "rough_edges", "ragged_tip", "overexposed",
     "root_hidden", "clamp_at_border", "height_doubtful", "tip_goes_on",
     "clamp_lines_differ", "other_rod", "width_mismatch", "colour_mismatch",
+    "width_uneven",
 ]  # fmt: skip
 
 
