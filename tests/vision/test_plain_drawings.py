@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -334,3 +336,16 @@ def test_a_rod_nearly_as_light_as_its_paper_is_found():
     found = measured(rod=(0.57,) * 3, turn_deg=30.0)
     assert found.length_mm == pytest.approx(20.0, abs=0.1)
     assert found.width_px == pytest.approx(WIDTH, rel=0.05)
+
+
+def test_a_rod_whose_colour_does_not_tell_it_is_measured_in_plain_light(monkeypatch):
+    """Coarse colours of a JPEG may hide a clamp: such rods were refused."""
+
+    def blind(photo, rod, view):
+        return rod, replace(view, grey=np.full_like(photo.grey, 0.5))
+
+    plain = measured(rod=RED, turn_deg=30.0)
+    monkeypatch.setattr("magbend.vision.extraction.extract.in_its_colour", blind)
+    found = measured(rod=RED, turn_deg=30.0)
+    assert found.length_mm == pytest.approx(plain.length_mm, abs=0.05)
+    assert "other_rod" in found.flags

@@ -186,37 +186,55 @@ def measure_candidate(
         If there is nothing to vouch for.
     """
     strip = along_candidate(view, candidate)
-    far, blur, width = _is_far(strip)
-    found, glossy = view, is_parted(strip)
-    if far or glossy:
+    far, glossy = _far(strip), is_parted(strip)
+    if glossy or far is not None:
         # No shade is hard then; and a streak, which may leave a rim of the rod, has the
         # colour of the paper.
-        view = in_lightness(photo, None if glossy else candidate, view)
+        rod, seen = candidate, in_lightness(photo, None if glossy else candidate, view)
     else:
-        candidate, view = in_its_colour(photo, candidate, view)
-    if view is not found:
-        strip = along_candidate(view, candidate)
-    if glossy:
+        rod, seen = in_its_colour(photo, candidate, view)
+    if seen is view:
+        return _measured_in(photo, setting, rod, view, strip, far)
+    try:
+        new = along_candidate(seen, rod)
+        return _measured_in(photo, setting, rod, seen, new, far)
+    except LostError:
+        return _doubted(_measured_in(photo, setting, candidate, view, strip, far))
+
+
+def _measured_in(
+    photo: Photo, setting: Setting, candidate: Candidate, view: View, strip: Strip,
+    far: tuple[float, float] | None,
+) -> Measurement:  # fmt: skip
+    """Measure a rod in one light, in which it is seen along a strip.
+
+    Raises
+    ------
+    LostError
+        If there is nothing to vouch for.
+    """
+    if is_parted(strip):
         view, candidate = whole_rod(view, candidate)
         strip = along_candidate(view, candidate)
-        far, blur, width = _is_far(strip)
+        far = _far(strip)
     elif candidate.halved:
         candidate = replace(candidate, rivalled=True)
     grey, sign = view.grey, view.sign
     start = _start(grey, candidate, sign)
-    alone = None if start.rough or far else rod_alone(strip, candidate, start.width)
+    soft = start.rough or far is not None
+    alone = None if soft else rod_alone(strip, candidate, start.width)
     if alone is not None:
         candidate, start = alone, _start(grey, alone, sign)
-    if far:
+    if far is not None:
         # Taken for sharp, such edges would be sought between too close levels, and seem
         # the sharper for it.
-        start = replace(start, rough=False, blur=blur, width=width)
+        start = replace(start, rough=False, blur=far[0], width=far[1])
     elif start.rough:
         # Strands, gaps and hairs blurred away, what is left is how much is rod.
         blur = SMOOTH * start.width
         grey = np.asarray(cv2.GaussianBlur(grey, (0, 0), blur))
-        soft = _start(grey, candidate, sign, blur)
-        start = replace(soft, rough=True, width=start.width)
+        smooth = _start(grey, candidate, sign, blur)
+        start = replace(smooth, rough=True, width=start.width)
     result = finish(photo, replace(view, grey=grey), start, candidate, setting)
     if alone is not None and result.width_px > BOTH * alone.width_px:
         raise LostError(
@@ -227,10 +245,10 @@ def measure_candidate(
     return result
 
 
-def _is_far(strip: Strip) -> tuple[bool, float, float]:
-    """Return whether a rod's edges feel each other in the blur; blur and width, px."""
+def _far(strip: Strip) -> tuple[float, float] | None:
+    """Return blur and width, px, of a rod whose edges feel each other in the blur."""
     blur, width, jump = blur_of(strip)
-    return blur > max(FAR * width, WANDER * jump), blur, width
+    return (blur, width) if blur > max(FAR * width, WANDER * jump) else None
 
 
 def finish(
