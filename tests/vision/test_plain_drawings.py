@@ -349,3 +349,12 @@ def test_a_rod_whose_colour_does_not_tell_it_is_measured_in_plain_light(monkeypa
     found = measured(rod=RED, turn_deg=30.0)
     assert found.length_mm == pytest.approx(plain.length_mm, abs=0.05)
     assert "other_rod" in found.flags
+
+
+@pytest.mark.parametrize(("shade_px", "alone"), [((-17, 3), True), ((-16, 6), False)])
+def test_a_front_that_shade_beside_the_root_leaves_unchecked_is_in_doubt(
+    shade_px, alone
+):
+    """The rod's own direction was unsure by 4.6 degrees, the front off by 1.4."""
+    found = measured(rod=(0.1, 0.1, 0.1), turn_deg=20.0, shade_px=shade_px, deep=0.5)
+    assert ("direction_doubtful" in found.flags) == alone

@@ -36,6 +36,9 @@ helps less at the root."""
 TURN_SHADE, TURN_WALL, TURN_PALE_WALL = 0.35, 0.05, 0.4
 """Shares of the shade's pull, and of the side wall that is seen (on a rod that is not
 dark: its light is not known), by which the midline is off all along, with one sign."""
+LONE_DEG = 1.0
+"""Turn by shade beside the root above which the rod says nothing of its direction: what
+the front of the clamp tells, which may be the shade's, is then unchecked."""
 DRIFT_SHADE, DRIFT_WHITE, DRIFT_REACH = 0.15, 0.03, 1.5
 DRIFT_BENT, DRIFT_PALE_BENT = 0.17, 0.4
 """Errors that neighbours share over so many widths: of the shade's pull; of the blur
@@ -106,6 +109,8 @@ def fit_clamp(
         shift[0], covariance = 0.0, np.diag([place_sd, math.radians(sd_deg)]) ** 2
     if root.lines_differ or apart > APART:
         flags = (*flags, "clamp_lines_differ")
+    if _turned_by_shade(refined) > math.radians(LONE_DEG):
+        flags = (*flags, "direction_doubtful")
     return ClampFit(
         s=root.s + shift[0], angle_deg=angle_deg, covariance=covariance, flags=flags
     )
@@ -194,6 +199,11 @@ def _rod_sd(refined: Refined, wall: Array, seen_in: View) -> float:
     return math.hypot(
         free * supple * fit.sigma_theta[0],
         free * fit.turned(np.hypot(drift, white), DRIFT_REACH * width),
-        TURN_SHADE * fit.lever @ refined.shaded,
+        _turned_by_shade(refined),
         facing * fit.lever @ wall,
     )
+
+
+def _turned_by_shade(refined: Refined) -> float:
+    """Return how far shade beside the root may turn the rod's own direction, rad."""
+    return TURN_SHADE * abs(float(refined.fit.lever @ refined.shaded))
