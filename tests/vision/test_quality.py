@@ -19,7 +19,6 @@ from magbend.vision.find.binarise import binarise
 from magbend.vision.find.ground import View
 from magbend.vision.find.rod import find_candidates
 from magbend.vision.find.track import start_curve
-from magbend.vision.measurement import Measurement
 from magbend.vision.synthetic.square_view import STANDARD, curve, draw
 
 
@@ -54,11 +53,10 @@ def test_root_put_short_of_the_clamp_is_doubted():
 def test_direction_that_leaves_the_tip_unsure_is_doubted():
     photo, rod, refined = measured()
     setting = Setting()
+    found = replace(extract(photo, None), length_mm=30.0)
 
     def flags(sd_deg):
-        line = Measurement(
-            status="ok", length_mm=30.0, width_px=20.0, clamp_angle_sd_deg=sd_deg
-        )
+        line = replace(found, clamp_angle_sd_deg=sd_deg)
         return doubts(line, photo, set(), refined, rod, setting).flags
 
     assert "direction_doubtful" not in flags(0.2)  # 0.10 mm at the tip

@@ -10,7 +10,7 @@ import pytest
 
 from magbend.vision.find.candidate import Candidate
 from magbend.vision.find.ground import LUMINANCE, View
-from magbend.vision.find.shadeless import in_its_colour, without_shades
+from magbend.vision.find.shadeless import in_its_colour, shades
 from magbend.vision.picture.photo import as_photo
 
 TAN, RED, BLACK = (0.26, 0.43, 0.58), (0.04, 0.04, 0.45), (0.03, 0.03, 0.03)
@@ -95,12 +95,24 @@ def test_where_colours_are_coarse_a_dark_rod_is_seen_by_its_lightness():
     assert seen(drawn(RED, coarse=True, **deep))[1].mix == LUMINANCE
 
 
+def told(photo, things):
+    return [list(each) for each in shades(photo, things)]
+
+
 def test_of_two_things_alike_the_one_without_colour_is_the_shade():
     """It is darker than a tan rod; a grey rod beside a wire is no copy of it."""
     photo = drawn(TAN, kept=(0.33, 0.3, 0.29), aside=45.0)
     rod, shade = candidate(0.0), candidate(45.0)
-    assert without_shades(photo, [shade, rod]) == [rod]
+    assert told(photo, [shade, rod])[0] == [True, False]
     wire = bent(48.0, bend=-20.0)
     photo = drawn((0.2, 0.2, 0.2), kept=(1.0, 1.0, 1.0), aside=0.0, other=(RED, wire))
     both = [rod, replace(rod, points_px=wire)]
-    assert without_shades(photo, both) == both
+    assert told(photo, both) == [[False, False], [False, False]]
+
+
+def test_beside_a_black_rod_what_is_paler_may_be_its_shade_but_no_coloured_rod():
+    rod, other = candidate(0.0), candidate(45.0)
+    photo = drawn(BLACK, kept=(0.4, 0.4, 0.4), aside=45.0)
+    assert told(photo, [other, rod]) == [[False, False], [True, False]]
+    photo = drawn(BLACK, kept=(1.0, 1.0, 1.0), aside=0.0, other=(RED, bent(45.0)))
+    assert told(photo, [other, rod]) == [[False, False], [False, False]]

@@ -88,9 +88,12 @@ def test_lane_with_a_speck_at_the_end_counts_for_nothing():
     assert fitted(light).s == pytest.approx(0.0, abs=0.01)
 
 
-def test_lines_at_the_clamp_weigh_as_their_steps_squared():
-    lines = ClampLines(face=replace(LINE, rise=0.1), front=replace(LINE, rise=0.3))
-    assert between(1.0, 2.0, lines) == pytest.approx(1.9)
+def test_lines_at_the_clamp_weigh_as_their_steps_squared_and_as_they_are_seen():
+    """The front is seen over three widths of the rod, the face over 0.6."""
+    alike = ClampLines(face=replace(LINE, rise=0.2), front=replace(LINE, rise=0.2))
+    assert between(1.0, 2.0, alike) == pytest.approx(1.0 + 5.0 / 6.0)
+    higher = ClampLines(face=replace(LINE, rise=0.1), front=replace(LINE, rise=0.3))
+    assert between(1.0, 2.0, higher) == pytest.approx(1.0 + 45.0 / 46.0)
     unknown = ClampLines(face=LINE, front=LINE)
     assert between(1.0, 2.0, unknown) == pytest.approx(1.5)
 

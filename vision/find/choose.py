@@ -17,7 +17,7 @@ from .ground import FAINT, LEVELS, View, best_view, ground_distance
 from .lines import without_lines
 from .rod import LEAST_SHARE, find_candidates
 from .rod_colour import ALIKE, distance_from
-from .shadeless import without_shades
+from .shadeless import shades
 from .things import Thing, find_things
 
 Array = NDArray[np.float64]
@@ -41,9 +41,6 @@ _AS_CLEAR = 0.6
 _AS_LONG = 0.6
 """Length over the rod's from which another thing cannot be told from it; a shorter one
 is a doubt."""
-
-_PALER_COPY = 0.04
-"""How much paler than the rod, of the paper's light, a deep shade of it may be."""
 
 _DARK = 0.25
 """Light of a rod, over the paper's, that no mix of colours tells much better."""
@@ -170,9 +167,7 @@ def _search(photo: Photo, sought: Sought, binary: Binary) -> tuple[Candidate, Vi
     if not things:
         raise LostError("no_rod", "nothing in the picture is long and thin like a rod")
     seen = [thing.best.points_px for thing in things[:_SHOWN]]
-    best = [thing.best for thing in things]
-    lit = {id(rod) for rod in without_shades(photo, best)}
-    things = [thing for thing, rod in zip(things, best, strict=True) if id(rod) in lit]
+    things = _without_shades(photo, things)
     rod = _standing_out(things, sought, seen)
     if rod.root == "free" and sought.clamp != "none":
         raise LostError("no_clamp", _NO_CLAMP, seen)
@@ -192,15 +187,23 @@ def _search(photo: Photo, sought: Sought, binary: Binary) -> tuple[Candidate, Vi
     return rod, view
 
 
+def _without_shades(photo: Photo, things: list[Thing]) -> list[Thing]:
+    """Leave out what is known for a shade, and note what may be one."""
+    known, likely = shades(photo, [thing.best for thing in things])
+    return [
+        replace(thing, is_shade=bool(shade))
+        for thing, out, shade in zip(things, known, likely, strict=True)
+        if not out
+    ]
+
+
 def _standing_out(things: list[Thing], sought: Sought, seen: list[Array]) -> Candidate:
     """Return the rod among the things of a picture, the likeliest first."""
     own = [
         thing
         for thing in things
-        if not any(
-            _is_shade(thing.best, other.best) or _is_paler_copy(thing.best, other.best)
-            for other in things
-        )
+        if not thing.is_shade
+        and not any(_is_shade(thing.best, other.best) for other in things)
     ]
     held = [thing for thing in own if thing.best.root != "free"]
     first = own[0]
@@ -210,18 +213,18 @@ def _standing_out(things: list[Thing], sought: Sought, seen: list[Array]) -> Can
         [first, *_all_rivals(first, own)], key=lambda item: sought.misfit(item.best)
     )
     rivals = [
-        other.best
+        other
         for other in _all_rivals(first, things)
         if not sought.tells(first.best, other.best, _TOLD)
     ]
     halved = any(_are_halves(first.best, other.best) for other in things)
     rod = replace(first.best, rivalled=bool(rivals), halved=halved)
     alike = [
-        other
+        other.best
         for other in rivals
-        if other.length_px > _AS_LONG * rod.length_px
-        and not sought.tells(rod, other, _HINTED)
-        and not _is_paler_copy(other, rod)
+        if not other.is_shade
+        and other.best.length_px > _AS_LONG * rod.length_px
+        and not sought.tells(rod, other.best, _HINTED)
     ]
     if alike:
         raise _too_many([rod, *alike], seen)
@@ -244,19 +247,6 @@ def _is_shade(one: Candidate, rod: Candidate) -> bool:
     alike = 0.4 < one.length_px / rod.length_px < 2.0
     away = [rod.away(point) for point in one.points_px[:: len(one.points_px) // 8 + 1]]
     return alike and max(away) < _BESIDE * rod.width_px
-
-
-def _is_paler_copy(one: Candidate, rod: Candidate) -> bool:
-    """Whether a thing is paler than another and its copy beside it, as a shade is."""
-    if one.ratio < rod.ratio + _PALER_COPY:
-        return False
-    alike = 0.8 < one.length_px / rod.length_px < 1.25
-    if not alike or not 0.7 < one.width_px / rod.width_px < 1.4:
-        return False
-    # From the tips on: the root of a shade may lie in that of the clamp.
-    along = np.linspace(0.0, 0.9 * min(one.length_px, rod.length_px), 12)
-    moved = one.from_tip(along) - rod.from_tip(along)
-    return bool(np.hypot(*(moved - moved.mean(axis=0)).T).max() < rod.width_px)
 
 
 def _are_halves(one: Candidate, other: Candidate) -> bool:

@@ -51,8 +51,12 @@ _DEEPEST, _COPY, _SHIFT = 0.1, 0.3, 0.05
 shade may wander from where its rod must be, in widths; and the part of a shift that
 must be seen across a rod, for what lies along it is not."""
 
-_SHIFTED, _ASTRAY = 6.0, 0.7
-"""How far a copy may be shifted, and wander from there, in widths."""
+_SHIFTED, _ASTRAY, _AS_WIDE = 6.0, 0.7, 0.6
+"""How far a copy may be shifted, and wander from there, in widths; and its width over
+the rod's, or the rod's over that, at least."""
+
+_PALER = 0.04
+"""How much paler than a rod without colour, of the paper's light, its shade is."""
 
 _MISSING, _MISSING_PX, _UNEVEN = 0.03, 0.7, 0.06
 """Light of the paper that is missing beside a rod where it has a shade: as that of so
@@ -140,8 +144,12 @@ def _near(rod: Candidate) -> Array:
     return np.vstack([rod.points_px - reach, rod.points_px + reach])
 
 
-def without_shades(photo: Photo, things: Sequence[Candidate]) -> list[Candidate]:
-    """Return things but for those without colour that are copies of a coloured one.
+def shades(photo: Photo, things: Sequence[Candidate]) -> tuple[Mask, Mask]:
+    """Return which things are known for shades of others, and which may be; (n,) each.
+
+    A shade is its rod once more, without colour and with some of the paper's light. That
+    of a coloured rod is known by this; beside another it is the paler of two, as a
+    second rod may be too.
 
     Parameters
     ----------
@@ -150,23 +158,25 @@ def without_shades(photo: Photo, things: Sequence[Candidate]) -> list[Candidate]
     things : sequence of Candidate
         What is long and thin in it.
     """
+    hue, light = _hue_and_light(photo, things)
+    grey = (hue < _COLOURED) & (light > _DEEPEST) & (light < 1.0)
+    known, likely = np.zeros((2, len(things)), np.bool_)
+    for k in np.flatnonzero(grey):
+        rods = [i for i, rod in enumerate(things) if _is_copy(things[k], rod)]
+        known[k] = any(hue[i] > _COLOURED + hue[k] for i in rods)
+        likely[k] = any(light[i] < light[k] - _PALER for i in rods)
+    return known, likely
+
+
+def _hue_and_light(photo: Photo, things: Sequence[Candidate]) -> tuple[Array, Array]:
+    """Return how far things are from grey and how light, over the paper's; (n,)."""
     paper = _paper_colour(photo)
     if paper is None or len(things) < 2:
-        return list(things)
-    light = [np.asarray(photo.colour_at(thing.points_px)) for thing in things]
-    share = np.array([np.median(each, axis=0) / paper for each in light])
-    brightness = share.mean(axis=1)
-    hue = np.linalg.norm(share - brightness[:, None], axis=1)
-    grey = (hue < _COLOURED) & (brightness > _DEEPEST) & (brightness < 1.0)
-    return [
-        thing
-        for k, thing in enumerate(things)
-        if not grey[k]
-        or not any(
-            hue[i] > _COLOURED + hue[k] and _is_copy(thing, rod)
-            for i, rod in enumerate(things)
-        )
-    ]
+        return np.zeros(len(things)), np.array([thing.ratio for thing in things])
+    colours = [np.asarray(photo.colour_at(thing.points_px)) for thing in things]
+    share = np.array([np.median(each, axis=0) / paper for each in colours])
+    light = share.mean(axis=1)
+    return np.linalg.norm(share - light[:, None], axis=1), light
 
 
 def _is_copy(one: Candidate, other: Candidate) -> bool:
@@ -174,6 +184,9 @@ def _is_copy(one: Candidate, other: Candidate) -> bool:
     length = min(one.length_px, other.length_px)
     if length < _ALL_ALONG * max(one.length_px, other.length_px):
         return False
+    if not _AS_WIDE < one.width_px / other.width_px < 1.0 / _AS_WIDE:
+        return False
+    # From the tips on: the root of a shade may lie in that of the clamp.
     from_tip = np.linspace(0.0, 0.9 * length, 10)
     shift = one.from_tip(from_tip) - other.from_tip(from_tip)
     near = float(np.hypot(*np.median(shift, axis=0))) < _SHIFTED * other.width_px

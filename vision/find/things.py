@@ -28,9 +28,18 @@ LEAST_LEVELS = 2
 
 @dataclass(slots=True)
 class Thing:
-    """One thing at all levels at which it is seen, the strictest first."""
+    """One thing at all levels at which it is seen, the strictest first.
+
+    Parameters
+    ----------
+    seen : list of Candidate
+        How each level shows it.
+    is_shade : bool
+        Whether it may be the shade of another.
+    """
 
     seen: list[Candidate] = field(default_factory=list)
+    is_shade: bool = False
 
     @property
     def best(self) -> Candidate:
