@@ -12,6 +12,11 @@ from ..edge.state import Root
 Array = NDArray[np.float64]
 
 
+_NET, _NET_WIDTHS = 3, 10.0
+"""Crossings from which a thing is a thread of a net, if they are no farther apart than
+so many widths."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
     """Something long and thin, in pixels of the photograph.
@@ -61,6 +66,12 @@ class Candidate:
     def is_held_at_end(self) -> bool:
         """Whether it touches something besides what it grows from."""
         return self.contacts > (self.root != "free")
+
+    @property
+    def is_in_net(self) -> bool:
+        """Whether it is crossed all along, as the squares of a board are."""
+        crossed = len(self.hidden_px)
+        return crossed >= _NET and self.slenderness < _NET_WIDTHS * crossed
 
     def reversed(self) -> Candidate:
         """Return it from its other end on."""

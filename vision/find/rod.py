@@ -73,7 +73,7 @@ def find_candidates(binary: Binary) -> list[Candidate]:
             continue
         roi = _fill(contours, links, index, (x, y, w, h))
         found.extend(_thin_parts(roi, (x, y), binary))
-    found = joined(found, binary)
+    found = [item for item in joined(found, binary) if not item.is_in_net]
     found.sort(key=lambda item: -item.length_px)
     return found
 
