@@ -39,9 +39,9 @@ _SURE_PX = 0.25
 _STILL_PX, _ENDS_STILL_PX = 0.05, 0.15
 """By how much the curve and its ends may move when all is found: the next pass would
 move it by a tenth of that. The ends are those of the curve as it is then."""
-_SHADED_STILL_PX, _SHADED_PX = 0.02, 0.02
-"""By how much where half of the midline is pulled by so much shade: the blur is found
-slowly there, and the levels hang on it."""
+_PULLED_STILL_PX, _PULLED_PX = 0.02, 0.02
+"""By how much where half of the midline is pulled by so much, by shade, or by blur where
+it is bent: the blur is found slowly there, and both hang on it."""
 _NEAR_STILL_PX = 0.08
 """The first of them in a film, where time counts: what is left is a part of it."""
 _KEPT_PX = 0.05
@@ -207,8 +207,9 @@ def refine(
         end = tip.s
         moved = abs(first) + abs(end - state.last)
         near_px = still_px
-        if still_px == _STILL_PX and median(shaded) > _SHADED_PX:
-            near_px = _SHADED_STILL_PX
+        pulled = shaded + 0.5 * state.blur**2 * np.abs(fit.curve.kappa)
+        if still_px == _STILL_PX and median(pulled) > _PULLED_PX:
+            near_px = _PULLED_STILL_PX
         still = aside < near_px and moved < _ENDS_STILL_PX
         settled = still and not sought
         if settled:
