@@ -40,8 +40,8 @@ _STILL_PX, _ENDS_STILL_PX = 0.05, 0.15
 """By how much the curve and its ends may move when all is found: the next pass would
 move it by a tenth of that. The ends are those of the curve as it is then."""
 _PULLED_STILL_PX, _PULLED_PX = 0.02, 0.02
-"""By how much where half of the midline is pulled by so much, by shade, or by blur where
-it is bent: the blur is found slowly there, and both hang on it."""
+"""By how much where half of the midline is pulled by so much, by shade, or by blur
+where it is bent: the blur is found slowly there, and both hang on it."""
 _NEAR_STILL_PX = 0.08
 """The first of them in a film, where time counts: what is left is a part of it."""
 _KEPT_PX = 0.05

@@ -147,8 +147,8 @@ def _near(rod: Candidate) -> Array:
 def shades(photo: Photo, things: Sequence[Candidate]) -> tuple[Mask, Mask]:
     """Return which things are known for shades of others, and which may be; (n,) each.
 
-    A shade is its rod once more, without colour and with some of the paper's light. That
-    of a coloured rod is known by this; beside another it is the paler of two, as a
+    A shade is its rod once more, without colour and with some of the paper's light.
+    That of a coloured rod is known by this; beside another it is the paler of two, as a
     second rod may be too.
 
     Parameters
@@ -161,8 +161,8 @@ def shades(photo: Photo, things: Sequence[Candidate]) -> tuple[Mask, Mask]:
     hue, light = _hue_and_light(photo, things)
     grey = (hue < _COLOURED) & (light > _DEEPEST) & (light < 1.0)
     known, likely = np.zeros((2, len(things)), np.bool_)
-    for k in np.flatnonzero(grey):
-        rods = [i for i, rod in enumerate(things) if _is_copy(things[k], rod)]
+    for k, thing in enumerate(things):
+        rods = [i for i, rod in enumerate(things) if grey[k] and _is_copy(thing, rod)]
         known[k] = any(hue[i] > _COLOURED + hue[k] for i in rods)
         likely[k] = any(light[i] < light[k] - _PALER for i in rods)
     return known, likely
