@@ -22,8 +22,10 @@ from .step_line import sample_lanes
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 
-FELT = 0.15
-"""Blur, in widths, from which two edges feel each other: 1e-3 of a width."""
+FELT = 0.2
+"""Blur, in widths, from which two edges feel each other by more than 6e-3 of a width.
+
+Below, one blur for the whole rod is no better, where it moved."""
 
 _PIECES, _SHOWN, _PAPER = 20, 0.5, 4.0
 """Pieces along a rod, the share of them, and of each, that must be seen; and how far
