@@ -10,7 +10,7 @@ import pytest
 
 from magbend.core import Section, Specimen
 from magbend.core.errors import InputError
-from magbend.vision import as_photo, extract
+from magbend.vision import as_photo, extract, read_photo
 from magbend.vision.camera.calibrate import calibrate_known_length
 from magbend.vision.extraction.setting import Setting, with_specimen
 
@@ -80,6 +80,21 @@ def test_of_a_grey_photograph_only_the_lightness_tells():
     }
     assert "colour_mismatch" not in told[BLACK]
     assert "colour_mismatch" in told[TAN]
+
+
+def test_a_grey_file_has_no_colour_that_could_be_wrong(tmp_path):
+    file = tmp_path / "grey.png"
+    cv2.imwrite(str(file), (255.0 * photograph([BLUE]).grey ** (1 / 2.4)).astype("u1"))
+    found = extract(read_photo(file), SCALE, rod_height_mm=0.0, colour=BLUE)
+    assert found.ok, found.reason
+    assert "colour_mismatch" not in found.flags
+
+
+def test_a_refusal_does_not_ask_for_what_was_told():
+    found = extract(photograph([BLUE, BLUE]), SCALE, rod_height_mm=0.0, colour=BLUE)
+    assert found.flags == ("two_rods",)
+    assert "--specimen" not in found.reason
+    assert "(its colour) does not tell" in found.reason
 
 
 def test_a_specimen_tells_its_colour_to_the_setting():

@@ -227,7 +227,7 @@ def _standing_out(things: list[Thing], sought: Sought, seen: list[Array]) -> Can
         and not sought.tells(rod, other.best, _HINTED)
     ]
     if alike:
-        raise _too_many([rod, *alike], seen)
+        raise _too_many([rod, *alike], seen, sought)
     return rod
 
 
@@ -259,19 +259,33 @@ def _are_halves(one: Candidate, other: Candidate) -> bool:
     return alike and bool(np.quantile(away, 0.9) < close)
 
 
-def _too_many(rods: list[Candidate], seen: list[Array]) -> LostError:
+def _too_many(rods: list[Candidate], seen: list[Array], sought: Sought) -> LostError:
+    told = [
+        name
+        for name, known in (
+            ("colour", sought.colour),
+            ("width", sought.width_px),
+            ("length", sought.length_px),
+        )
+        if known
+    ]
+    way_out = ", or say --specimen"
+    if told:
+        way_out = (
+            f"; what you told of the rod (its {' and '.join(told)}) does not tell which"
+        )
     if len(rods) == 2:
         return LostError(
             "two_rods",
             "there are two things like a rod in the picture, "
             f"{rods[0].length_px:.0f} and {rods[1].length_px:.0f} px long; cover one "
-            "of them, or say --specimen",
+            f"of them{way_out}",
             seen,
         )
     return LostError(
         "no_rod",
         f"there are {len(rods)} long and thin things in the picture and none that "
-        "stands out as the rod; cover the others, or say --specimen",
+        f"stands out as the rod; cover the others{way_out}",
         seen,
     )
 
@@ -316,7 +330,7 @@ def _choose(binary: Binary, sought: Sought) -> Candidate:
         ]
         if others:
             seen = [item.points_px for item in [rod, *others][:_SHOWN]]
-            raise _too_many([rod, *others], seen)
+            raise _too_many([rod, *others], seen, sought)
         rod = replace(rod, halved=any(_are_halves(rod, other) for other in rods))
         # What shows only where less is dark may be the clamp's shade: seek its root.
         alike = best is None or best.lies_on(rod)

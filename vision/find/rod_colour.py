@@ -35,7 +35,8 @@ def distance_from(photo: Photo, colour: str) -> Callable[[Array], float]:
     Parameters
     ----------
     photo : Photo
-        The photograph; of a grey one only the lightness tells.
+        The photograph; of a grey one, or one whose blue, green and red are alike as
+        files of grey cameras have them, only the lightness tells.
     colour : str
         Blue, green and red of a rod on white paper, as ``#rrggbb`` (sRGB).
 
@@ -54,7 +55,7 @@ def distance_from(photo: Photo, colour: str) -> Callable[[Array], float]:
     code = [int(colour[k : k + 2], 16) for k in (5, 3, 1)]
     srgb = np.array([[code]], np.float32) / np.float32(255.0)
     known = np.asarray(cv2.cvtColor(srgb, cv2.COLOR_BGR2Lab)[0, 0], np.float64)
-    if light.shape[2] == 1:
+    if not np.ptp(light, axis=2).any():
         known = np.array([known[0], 0.0, 0.0])
 
     def distance(points_px: Array) -> float:
