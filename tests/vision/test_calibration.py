@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -350,3 +351,23 @@ def test_known_length_gives_the_scale():
         calibrate_known_length((99, 99), from_px=(1, 1), to_px=(2, 2), length_mm=25.0)
     with pytest.raises(InputError, match="99 x 99 px; instead received 1e"):
         calibrate_known_length((99, 99), from_px=(1, 1), to_px=(1e9, 2), length_mm=25.0)
+
+
+@pytest.mark.parametrize(
+    ("camera_mm", "rod_mm", "named"),
+    [
+        (-5.0, 0.0, "camera_height_mm must be above zero"),
+        (0.0, 0.0, "camera_height_mm must be above zero"),
+        (math.inf, 0.0, "camera_height_mm must be a finite number"),
+        (3.0, 5.0, "less than the height of the camera above the plane, 3 mm"),
+        (330.0, math.nan, "rod_height_mm must be a finite number"),
+    ],
+)
+def test_a_scale_needs_a_camera_above_plane_and_rod(camera_mm, rod_mm, named):
+    with pytest.raises(InputError, match=named):
+        scale_calibration(
+            mm_per_px=0.05,
+            image_size_px=(900, 600),
+            camera_height_mm=camera_mm,
+            rod_height_mm=rod_mm,
+        )

@@ -245,8 +245,6 @@ def calibrate_known_length(
         cannot be.
     """
     positive(length_mm, "length_mm", "mm")
-    if camera_height_mm is not None:
-        positive(camera_height_mm, "camera_height_mm", "mm")
     ends = [finite(value, "an end", "px") for value in (*from_px, *to_px)]
     width, height = size_px
     for x, y in (ends[:2], ends[2:]):

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.checks import finite, positive
 from ...core.errors import InputError, VisionError
 from ..measurement import Pose
 from .clamp_tag import ClampTag
@@ -108,6 +109,12 @@ class Calibration:
             raise InputError(
                 "calibration rotation must be a rotation matrix; instead its product "
                 f"with its transpose differs from the unit matrix by {error:.2g}"
+            )
+        height = finite(self.rod_height_mm, "rod_height_mm", "mm")
+        if height >= self.camera_height_mm:
+            raise InputError(
+                "rod_height_mm must be less than the height of the camera above the "
+                f"plane, {self.camera_height_mm:g} mm; instead received {height:g} mm"
             )
 
     @property
@@ -230,6 +237,9 @@ def scale_calibration(
     -----
     The frame's origin is the centre of the picture, x right, y up.
     """
+    positive(mm_per_px, "mm_per_px", "mm/px")
+    if camera_height_mm is not None:
+        positive(camera_height_mm, "camera_height_mm", "mm")
     width, height = image_size_px
     centre = ((width - 1) / 2.0, (height - 1) / 2.0)
     far = camera_height_mm is None
