@@ -8,7 +8,7 @@ what is between them.
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import combinations, product
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,14 +49,32 @@ def joined(parts: list[Candidate], binary: Binary) -> list[Candidate]:
     binary : Binary
         The working picture.
     """
-    left = list(parts)
-    while True:
-        pairs = combinations(range(len(left)), 2)
-        wholes = ((i, j, _joined(left[i], left[j], binary)) for i, j in pairs)
-        i, j, whole = next((item for item in wholes if item[2]), (0, 0, None))
-        if whole is None:
-            return left
-        left = [whole, *(part for k, part in enumerate(left) if k not in (i, j))]
+    left: dict[int, Candidate] = {}
+    ends = np.full((len(parts), 2, 2), np.inf)
+    for k, whole in enumerate(parts):
+        while True:
+            apart = _apart(_ends(whole), ends)
+            near = np.flatnonzero(apart <= _FAR * whole.width_px).tolist()
+            wholes = ((m, _joined(left[m], whole, binary)) for m in near)
+            m, longer = next((item for item in wholes if item[1]), (k, None))
+            if longer is None:
+                break
+            whole = longer
+            del left[m]
+            ends[m] = np.inf
+        left[k], ends[k] = whole, _ends(whole)
+    return list(left.values())
+
+
+def _ends(part: Candidate) -> Array:
+    """Return where a part begins and ends, shape (2, 2), px."""
+    return part.points_px[[0, -1]]
+
+
+def _apart(ends: Array, others: Array) -> Array:
+    """Return the least distance of two ends (2, 2) from those of others (n, 2, 2)."""
+    gaps = others[:, :, None] - ends
+    return np.asarray(np.hypot(*np.moveaxis(gaps, -1, 0)).min(axis=(1, 2)))
 
 
 def _joined(one: Candidate, other: Candidate, binary: Binary) -> Candidate | None:
