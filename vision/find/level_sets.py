@@ -8,6 +8,7 @@ sides of a slit in it are one.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
@@ -199,10 +200,11 @@ def _without_slits(
     for first, other in pairs:
         sides = []
         while first >= 0 and same[first] != same[other]:
+            if math.dist(centres[first], centres[other]) >= near:
+                break  # the loop of a mesh, or of a rod: no slit
             sides.append((first, other))
             first, other = before[first], before[other]
-        apart = [np.hypot(*(centres[one] - centres[two])) for one, two in sides]
-        if apart and max(apart) < near:
+        else:
             for one, two in sides:
                 same[same == same[two]] = same[one]
     kept, number = np.unique(same, return_inverse=True)
