@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from magbend.vision import as_photo
+from magbend.vision.find.binarise import binarise
 from magbend.vision.find.choose import Sought, search_rod
 from magbend.vision.find.ground import ground_distance
 from magbend.vision.find.lines import without_lines
+from magbend.vision.find.rod import find_candidates
 
 MAT, PALE, WHITE = (0.08, 0.25, 0.09), (0.45, 0.6, 0.45), (0.7, 0.7, 0.7)
 SKY, DARK = (0.6, 0.45, 0.25), (0.03, 0.05, 0.04)
@@ -67,3 +69,10 @@ def test_what_is_wider_than_the_lines_stays_as_wide():
     x, y = np.rint(axis[20:-20]).astype(int).T
     assert np.abs(after.ratio - before.ratio)[y, x].max() < 0.1
     assert (after.ratio > 0.93).mean() > 0.75 > (before.ratio > 0.93).mean() + 0.05
+
+
+def test_squared_paper_is_no_rod_nor_is_it_followed_from_mesh_to_mesh():
+    photo, _ = mat(rod=SKY, line=DARK)
+    binary = binarise(photo.grey, invert=False)
+    assert cv2.connectedComponents(1 - binary.mask)[0] > 200
+    assert find_candidates(binary) == []

@@ -40,6 +40,9 @@ _ASLANT = 2.5
 _BIN, _HALVED = 0.09, 8
 """Width of a bin of log width, and bins from one width to half of it."""
 
+_MESHES = 100
+"""Holes of a thing above which it is squared paper, and whatever lies on it."""
+
 _GRAIN = 1.5
 """Half width under which a thing may be noise."""
 
@@ -71,31 +74,37 @@ def find_candidates(binary: Binary) -> list[Candidate]:
         x, y, w, h = cv2.boundingRect(contours[index])
         if max(w, h) < least:
             continue
-        roi = _fill(contours, links, index, (x, y, w, h))
+        holes = _holes(contours, links, index)
+        if len(holes) > _MESHES:
+            continue
+        roi = _fill(contours, index, holes, (x, y, w, h))
         found.extend(_thin_parts(roi, (x, y), binary))
     found = [item for item in joined(found, binary) if not item.is_in_net]
     found.sort(key=lambda item: -item.length_px)
     return found
 
 
+def _holes(contours: object, tree: NDArray[np.int32], index: int) -> list[int]:
+    """Return the holes of a thing; its slits (glare) are none."""
+    found, child = [], int(tree[index, 2])
+    while child >= 0:
+        hole = contours[child]  # type: ignore[index]
+        if 2.0 * cv2.contourArea(hole) > 5.0 * cv2.arcLength(hole, closed=True):
+            found.append(child)
+        child = int(tree[child, 0])
+    return found
+
+
 def _fill(
-    contours: object,
-    tree: NDArray[np.int32],
-    index: int,
-    box: tuple[int, int, int, int],
+    contours: object, index: int, holes: list[int], box: tuple[int, int, int, int]
 ) -> Mask:
-    """Draw one thing with a frame of 1 px; slits (glare) are closed, holes stay."""
+    """Draw one thing, with its holes and a frame of 1 px."""
     x, y, w, h = box
     roi = np.zeros((h + 2, w + 2), np.uint8)
     offset = (1 - x, 1 - y)
     cv2.drawContours(roi, contours, index, 1, cv2.FILLED, offset=offset)  # type: ignore[call-overload]
-    child = int(tree[index, 2])
-    while child >= 0:
-        hole = contours[child]  # type: ignore[index]
-        area = cv2.contourArea(hole)
-        if 2.0 * area > 5.0 * cv2.arcLength(hole, closed=True):
-            cv2.drawContours(roi, contours, child, 0, cv2.FILLED, offset=offset)  # type: ignore[call-overload]
-        child = int(tree[child, 0])
+    for hole in holes:
+        cv2.drawContours(roi, contours, hole, 0, cv2.FILLED, offset=offset)  # type: ignore[call-overload]
     return roi
 
 
