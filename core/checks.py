@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import operator
 import reprlib
+import sys
 from collections.abc import Sequence
 from typing import Any, SupportsFloat
 
@@ -25,7 +26,7 @@ def _plain(value: object) -> object:
 
 
 def finite(value: SupportsFloat, quantity: str, unit: str = "") -> float:
-    """Return `value` as a float.
+    """Return `value` as a float; one too small for all its digits is zero.
 
     Parameters
     ----------
@@ -44,7 +45,7 @@ def finite(value: SupportsFloat, quantity: str, unit: str = "") -> float:
             f"{quantity} must be a finite number{_in(unit)}; instead received "
             f"{shown(value)}"
         )
-    return number
+    return number if abs(number) >= sys.float_info.min else 0.0
 
 
 def _real(value: object) -> float:

@@ -118,6 +118,12 @@ def test_odd_number_alternating_and_the_solved_one_among_them(
     assert min(abs(one.theta_tip_rad - solved.theta_rad[-1]) for one in found) < 1e-9
 
 
+def test_an_angle_that_has_lost_its_digits_is_none() -> None:
+    """Below the least normal number the march lost the rod at 2e-313 degrees."""
+    tip = solve(gmc(7), UniformField(flux_mT=1977.0, angle_deg=2.3e-313)).centreline
+    assert tip.tip_mm == pytest.approx((30.0, 0.0), abs=1e-12)
+
+
 def test_opposite_magnetisation_is_the_opposite_field() -> None:
     turned = replace(ROD, remanence_mT=-100.0)
     one = find_equilibria(ROD, uniform(20.0, 60.0))
