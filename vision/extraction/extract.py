@@ -194,17 +194,22 @@ def measure_candidate(
     else:
         rod, seen = in_its_colour(photo, candidate, view)
     if seen is view:
-        return _measured_in(photo, setting, rod, view, strip, far)
+        return _measured_in(photo, setting, rod, view, strip, far, glossy=glossy)
     try:
         new = along_candidate(seen, rod)
-        return _measured_in(photo, setting, rod, seen, new, far)
+        return _measured_in(
+            photo, setting, rod, seen, new, far, glossy=is_parted(new)
+        )  # fmt: skip
     except LostError:
-        return _doubted(_measured_in(photo, setting, candidate, view, strip, far))
+        plain = _measured_in(
+            photo, setting, candidate, view, strip, far, glossy=glossy
+        )  # fmt: skip
+        return _doubted(plain)
 
 
 def _measured_in(
     photo: Photo, setting: Setting, candidate: Candidate, view: View, strip: Strip,
-    far: tuple[float, float] | None,
+    far: tuple[float, float] | None, *, glossy: bool,
 ) -> Measurement:  # fmt: skip
     """Measure a rod in one light, in which it is seen along a strip.
 
@@ -213,7 +218,7 @@ def _measured_in(
     LostError
         If there is nothing to vouch for.
     """
-    if is_parted(strip):
+    if glossy:
         view, candidate = whole_rod(view, candidate)
         strip = along_candidate(view, candidate)
         far = _far(strip)

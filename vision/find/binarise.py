@@ -73,7 +73,7 @@ def binarise(grey: NDArray[np.float32], *, invert: bool | None = None) -> Binary
         None where nothing stands out from the background.
     """
     factor = max(1, round(max(grey.shape) / WORK_PX))
-    work = grey if factor == 1 else _shrunk(grey, factor)
+    work = grey if factor == 1 else shrunk(grey, factor)
     sample = work[::_STRIDE, ::_STRIDE] if work.size > 100_000 else work
     low, middle, high = _quantiles(sample, 0.003, 0.5, 0.997)
     if high - low < 0.02 or high < 1.3 * low:
@@ -94,10 +94,10 @@ def binarise(grey: NDArray[np.float32], *, invert: bool | None = None) -> Binary
     )  # fmt: skip
 
 
-def _shrunk(grey: NDArray[np.float32], factor: int) -> NDArray[np.float32]:
+def shrunk(light: NDArray[np.float32], factor: int) -> NDArray[np.float32]:
     """Return means of blocks of pixels; what is left over at two sides is dropped."""
-    height, width = grey.shape[0] // factor, grey.shape[1] // factor
-    whole = grey[: factor * height, : factor * width]
+    height, width = light.shape[0] // factor, light.shape[1] // factor
+    whole = light[: factor * height, : factor * width]
     small = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
     return np.asarray(small, np.float32)
 

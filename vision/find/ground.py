@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..curve.robust import median, quantile
 from ..picture.photo import Photo
-from .binarise import WORK_PX, Binary, quadric
+from .binarise import WORK_PX, Binary, quadric, shrunk
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -74,10 +74,9 @@ def ground_distance(photo: Photo) -> Binary:
     factor = max(1, round(max(photo.grey.shape) / WORK_PX))
     colour = photo.colour()
     light = photo.grey[..., None] if colour is None else colour
-    height, width = (side // factor for side in light.shape[:2])
-    whole = light[: height * factor, : width * factor]
-    small = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
-    small = np.asarray(small, np.float32).reshape(height, width, -1)
+    small = shrunk(light, factor)
+    height, width = small.shape[:2]
+    small = small.reshape(height, width, -1)
     bare = np.dstack([_paper_light(small[..., k]) for k in range(small.shape[2])])
     typical = np.median(bare, axis=(0, 1)).astype(np.float32)
     level = np.clip(small / bare * typical, 0.0, 1.5)

@@ -50,7 +50,8 @@ def distance_from(photo: Photo, colour: str) -> Callable[[Array], float]:
     CIE 015:2018; the ground as white: von Kries, Festschrift Univ. Freiburg (1902).
     """
     every = (slice(None, None, _EVERY_PX),) * 2
-    light = _light(photo, every)
+    colours = photo.colour(every)
+    light = photo.grey[every][..., None] if colours is None else colours
     white = _white(light)
     code = [int(colour[k : k + 2], 16) for k in (5, 3, 1)]
     srgb = np.array([[code]], np.float32) / np.float32(255.0)
@@ -59,18 +60,14 @@ def distance_from(photo: Photo, colour: str) -> Callable[[Array], float]:
         known = np.array([known[0], 0.0, 0.0])
 
     def distance(points_px: Array) -> float:
-        x, y = np.rint(points_px).astype(int).T
-        rows, columns = slice(y.min(), y.max() + 1), slice(x.min(), x.max() + 1)
-        thing = _light(photo, (rows, columns))[y - y.min(), x - x.min()]
+        thing = photo.colour_at(points_px)
+        if thing is None:
+            x, y = np.rint(points_px).astype(int).T
+            thing = photo.grey[y, x][:, None]
         away = _lab(np.median(thing, axis=0) / white) - known
         return float(np.hypot(_LIGHTNESS * away[0], np.hypot(*away[1:])))
 
     return distance
-
-
-def _light(photo: Photo, window: tuple[slice, slice]) -> NDArray[np.float32]:
-    colour = photo.colour(window)
-    return photo.grey[window][..., None] if colour is None else colour
 
 
 def _white(light: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -87,7 +84,7 @@ def _white(light: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.asarray(lightest * np.maximum(tint, np.float32(1e-3)))
 
 
-def _lab(light: NDArray[np.float32]) -> Array:
+def _lab(light: NDArray[np.floating]) -> Array:
     """Return L, a and b of linear blue, green and red."""
     bgr = np.broadcast_to(np.clip(light, 0.0, 1.0), (1, 1, 3)).astype(np.float32)
     return np.asarray(cv2.cvtColor(bgr, cv2.COLOR_LBGR2Lab)[0, 0], np.float64)
