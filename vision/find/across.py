@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..curve.robust import median
 from .binarise import Binary
 from .candidate import Candidate
+from .straight_on import turn
 
 Array = NDArray[np.float64]
 
@@ -49,6 +50,8 @@ def joined(parts: list[Candidate], binary: Binary) -> list[Candidate]:
     binary : Binary
         The working picture.
     """
+    if len(parts) < 2:
+        return parts
     left: dict[int, Candidate] = {}
     ends = np.full((len(parts), 2, 2), np.inf)
     for k, whole in enumerate(parts):
@@ -104,15 +107,10 @@ def leads_to(points: Array, then: Array, far: float) -> bool:
         return False
     before = points[-1] - points[-min(_CHORD, len(points))]
     after = then[min(_CHORD, len(then)) - 1] - then[0]
-    return (
-        abs(_turn(before, after)) < _TURN
-        and abs(_turn(before, gap) - _turn(gap, after)) < 2.0 * _ASTRAY
+    return bool(
+        abs(turn(before, after)) < _TURN
+        and abs(turn(before, gap) - turn(gap, after)) < 2.0 * _ASTRAY
     )
-
-
-def _turn(one: Array, other: Array) -> float:
-    """Return the angle from one direction to another, rad."""
-    return float(np.arctan2(one[0] * other[1] - one[1] * other[0], one @ other))
 
 
 def _is_bare(one: Candidate, other: Candidate, binary: Binary) -> bool:

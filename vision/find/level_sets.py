@@ -8,6 +8,7 @@ sides of a slit in it are one.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -61,43 +62,45 @@ class LevelSets:
     before: Places
     step: float
 
-    def parts_at(self, mask: Mask) -> Places:
-        """Return the numbers of the parts under a mask of the thing's size."""
-        parts = np.unique(self.part[thinned(mask, self.every) > 0])
-        return np.asarray(parts[parts >= 0], np.intp)
+    def parts_at(self, places: Places) -> set[int]:
+        """Return the numbers of the parts at places (row, column) of the thing."""
+        flat = _thinned(places, self.every, self.part.shape[1])
+        return set(self.part.ravel()[flat].tolist()) - {-1}
 
-    def where(self, part: int, shape: tuple[int, ...]) -> Mask:
-        """Return the mask of a part, of the thing's shape."""
-        mask = np.zeros(shape, np.uint8)
-        mask[:: self.every, :: self.every] = self.part == part
-        return mask
+    def where(self, part: int) -> Places:
+        """Return the places (row, column) of a part in the thing."""
+        return np.asarray(self.every * np.argwhere(self.part == part))
 
 
-def level_sets(piece: Mask, seeds: Mask | None, half: float) -> LevelSets | None:
+def level_sets(piece: Mask, seeds: Places | None, half: float) -> LevelSets | None:
     """Return the level sets of a thing; None where it is too short for any.
 
     Parameters
     ----------
     piece : ndarray, shape (h, w)
         1 on the thing, which a frame of 1 px surrounds.
-    seeds : ndarray, shape (h, w), or None
-        1 at its root; None begins at one of its ends.
+    seeds : ndarray of int, shape (k, 2), or None
+        Places (row, column) of its root; None begins at one of its ends.
     half : float
         Its half width, px.
     """
     every = max(1, int(half / _FINE_HALF))
-    small = np.ascontiguousarray(piece[::every, ::every])
-    seeds = None if seeds is None else thinned(seeds, every)
+    few = piece[::every, ::every]
+    small = np.asarray(
+        cv2.copyMakeBorder(few, 0, 1, 0, 1, cv2.BORDER_CONSTANT), np.uint8
+    )
+    root = None if seeds is None else _thinned(seeds, every, small.shape[1])
     half /= every
     for opening in _OPENINGS:
-        distance = _from_root(small, seeds, half, opening)
-        if np.count_nonzero(distance >= 0.0) > _REACHED * cv2.countNonZero(small):
+        distance = _from_root(small, root, half, opening)
+        reached = np.flatnonzero(distance >= 0.0)
+        if len(reached) > _REACHED * cv2.countNonZero(small):
             break  # else it cut the thing in two, at a gap in a yarn
     step = max(1.0, half)
     if float(distance.max()) < 4.0 * step:
         return None
-    part, sums, pairs = _parts(distance, step)
-    part, sums = _without_slits(part, sums, np.unique(pairs, axis=0), _SLIT * half)
+    part, sums, pairs = _parts(distance, reached, step)
+    part, sums = _without_slits(part, sums, pairs, _SLIT * half)
     return LevelSets(
         part=part, every=every, centres=every * sums[:, 1:3] / sums[:, :1],
         size=sums[:, 0], level=sums[:, 3].astype(np.intp),
@@ -105,90 +108,84 @@ def level_sets(piece: Mask, seeds: Mask | None, half: float) -> LevelSets | None
     )  # fmt: skip
 
 
-def thinned(mask: Mask, every: int) -> Mask:
-    """Return every so many pixels of a mask, none of which gets lost."""
-    if every == 1:
-        return mask
-    grown = cv2.dilate(mask, np.ones((every, every), np.uint8))
-    return np.ascontiguousarray(np.asarray(grown, np.uint8)[::every, ::every])
+def _thinned(places: Places, every: int, width: int) -> Places:
+    """Return where places are among every so many rows and columns, as flat indices."""
+    if every > 1:  # those on both sides
+        shifts = itertools.product((0, every - 1), repeat=2)
+        places = np.vstack([(places + shift) // every for shift in shifts])
+    row, column = places.T
+    return np.asarray(row * width + column)
 
 
 def _from_root(
-    piece: Mask, seeds: Mask | None, half: float, opening: float
+    piece: Mask, seeds: Places | None, half: float, opening: float
 ) -> NDArray[np.float32]:
     """Return the distance from the root inside a thing without its hairs, else -1."""
     smooth = piece
     if half >= 3.0:
         smooth = opened(piece, int(opening * half))
         if seeds is not None:
-            smooth = smooth | (piece & seeds)
-    smooth = np.ascontiguousarray(smooth, dtype=np.uint8)
+            smooth.ravel()[seeds] = piece.ravel()[seeds]
     if seeds is None:
-        first = np.argmax(smooth)
-        far = np.zeros_like(smooth)
-        far.flat[first] = 1
-        distance = _geodesic(smooth, far)
-        seeds = np.zeros_like(smooth)
-        seeds.flat[int(np.argmax(distance))] = 1
-    return np.asarray(_geodesic(smooth, np.ascontiguousarray(seeds & smooth)))
+        distance = _geodesic(smooth, np.array([np.argmax(smooth)]))
+        seeds = np.array([np.argmax(distance)])
+    return np.asarray(_geodesic(smooth, seeds))
 
 
 @njit(cache=True)
 def _parts(
-    distance: NDArray[np.float32], step: float
+    distance: NDArray[np.float32], reached: Places, step: float
 ) -> tuple[NDArray[np.int32], Array, NDArray[np.int32]]:
     """Return the part of each pixel; size, sums of x and y, level and part before.
 
-    And pairs of parts that are before one part both.
+    And pairs of parts that are before one part both. Distances of the pixels reached,
+    given by flat indices, are not negative.
     """
-    height, width = distance.shape
-    part = np.full((height, width), np.int32(-1))
-    stack = np.empty(height * width, np.int64)
+    far, width = distance.ravel(), distance.shape[1]
+    around, _ = _neighbours(width)
+    part = np.full(far.size, np.int32(-1))
+    for place in reached:  # by its level, as long as its part is not known
+        part[place] = -2 - int(far[place] / step)
+    stack = np.empty(len(reached), np.int64)
     sums = np.zeros((64, 5))
     count = 0
-    for place in range(height * width):
-        i, j = place // width, place % width
-        if distance[i, j] < 0.0 or part[i, j] >= 0:
+    for first in reached:
+        level = part[first]
+        if level >= 0:
             continue
         if count == len(sums):
             sums = np.concatenate((sums, np.zeros_like(sums)))
-        level = int(distance[i, j] / step)
-        sums[count, 3], sums[count, 4] = level, -1.0
-        part[i, j], stack[0], waiting = count, place, 1
+        sums[count, 3], sums[count, 4] = -2 - level, -1.0
+        part[first], stack[0], waiting = count, first, 1
         while waiting:
             waiting -= 1
-            i, j = stack[waiting] // width, stack[waiting] % width
+            place = stack[waiting]
+            row = place // width
             sums[count, 0] += 1.0
-            sums[count, 1] += j
-            sums[count, 2] += i
-            for k in range(max(i - 1, 0), min(i + 2, height)):
-                for m in range(max(j - 1, 0), min(j + 2, width)):
-                    if distance[k, m] < 0.0 or part[k, m] >= 0:
-                        continue
-                    if int(distance[k, m] / step) == level:
-                        part[k, m], stack[waiting] = count, k * width + m
-                        waiting += 1
+            sums[count, 1] += place - row * width
+            sums[count, 2] += row
+            for off in around:
+                if part[place + off] == level:
+                    part[place + off], stack[waiting] = count, place + off
+                    waiting += 1
         count += 1
     pairs, found = np.zeros((16, 2), np.int32), 0
-    for i in range(height):
-        for j in range(width):
-            own = part[i, j]
-            if own < 0:
+    for place in reached:
+        own = part[place]
+        level = sums[own, 3] - 1.0
+        for off in around:
+            other = part[place + off]
+            if other < 0 or other == own or sums[other, 3] != level:
                 continue
-            for k in range(max(i - 1, 0), min(i + 2, height)):
-                for m in range(max(j - 1, 0), min(j + 2, width)):
-                    other = part[k, m]
-                    if other < 0 or sums[other, 3] != sums[own, 3] - 1.0:
-                        continue
-                    first = int(sums[own, 4])
-                    if first < 0:
-                        sums[own, 4] = other
-                    elif first != other:
-                        if found == len(pairs):
-                            pairs = np.concatenate((pairs, np.zeros_like(pairs)))
-                        pairs[found, 0], pairs[found, 1] = first, other
-                        found += 1
-    return part, sums[:count], pairs[:found]
+            first = int(sums[own, 4])
+            if first < 0:
+                sums[own, 4] = other
+            elif first != other:
+                if found == len(pairs):
+                    pairs = np.concatenate((pairs, np.zeros_like(pairs)))
+                pairs[found, 0], pairs[found, 1] = first, other
+                found += 1
+    return part.reshape(distance.shape), sums[:count], pairs[:found]
 
 
 def _without_slits(
@@ -197,7 +194,7 @@ def _without_slits(
     """Return the parts once more, those as one that lie so near and join again."""
     same = np.arange(len(sums))
     centres, before = sums[:, 1:3] / sums[:, :1], sums[:, 4].astype(np.intp)
-    for first, other in pairs:
+    for first, other in sorted(set(map(tuple, pairs.tolist()))):
         sides = []
         while first >= 0 and same[first] != same[other]:
             if math.dist(centres[first], centres[other]) >= near:
@@ -207,9 +204,9 @@ def _without_slits(
         else:
             for one, two in sides:
                 same[same == same[two]] = same[one]
-    kept, number = np.unique(same, return_inverse=True)
-    if len(kept) == len(sums):
+    if np.array_equal(same, np.arange(len(sums))):
         return part, sums
+    kept, number = np.unique(same, return_inverse=True)
     joined = sums[kept]
     joined[:, :3] = 0.0
     np.add.at(joined, number, np.pad(sums[:, :3], ((0, 0), (0, 2))))
@@ -218,39 +215,45 @@ def _without_slits(
 
 
 @njit(cache=True)
-def _geodesic(mask: Mask, seeds: Mask) -> NDArray[np.float32]:
-    """Distance from the seeds inside the mask (8 neighbours); -1 where unreached."""
-    height, width = mask.shape
-    distance = np.full((height, width), -1.0, dtype=np.float32)
-    size = int(mask.sum()) + 1
+def _geodesic(mask: Mask, seeds: Places) -> NDArray[np.float32]:
+    """Distance from the seeds inside the mask (8 neighbours); -1 where unreached.
+
+    Seeds are flat indices; of those outside the mask nothing sets out.
+    """
+    inside = mask.ravel()
+    around, far = _neighbours(mask.shape[1])
+    distance = np.full(mask.size, np.float32(-1.0))
+    size = int(inside.sum()) + 1
     queue = np.empty(size, dtype=np.int64)
-    waiting = np.zeros(height * width, dtype=np.uint8)
+    waiting = np.zeros(mask.size, dtype=np.uint8)
     head, tail = 0, 0
-    for i in range(height):
-        for j in range(width):
-            if seeds[i, j] and mask[i, j]:
-                distance[i, j] = 0.0
-                queue[tail] = i * width + j
-                waiting[i * width + j] = 1
-                tail += 1
+    for place in seeds:
+        if inside[place] and not waiting[place]:
+            distance[place] = 0.0
+            queue[tail] = place
+            waiting[place] = 1
+            tail += 1
     while head != tail:
         place = queue[head]
-        head = (head + 1) % size
+        head = head + 1 if head + 1 < size else 0
         waiting[place] = 0
-        i, j = place // width, place % width
-        for di in range(-1, 2):
-            for dj in range(-1, 2):
-                k, m = i + di, j + dj
-                if k < 0 or m < 0 or k >= height or m >= width or mask[k, m] == 0:
-                    continue
-                step = 1.0 if di == 0 or dj == 0 else 1.41421356
-                new = distance[i, j] + np.float32(step)
-                old = distance[k, m]
-                if old < 0.0 or new < old - 1e-4:
-                    distance[k, m] = new
-                    spot = k * width + m
-                    if waiting[spot] == 0:
-                        waiting[spot] = 1
-                        queue[tail] = spot
-                        tail = (tail + 1) % size
-    return distance
+        for k in range(8):
+            spot = place + around[k]
+            if not inside[spot]:
+                continue
+            new, old = distance[place] + far[k], distance[spot]
+            if old < 0.0 or new < old - 1e-4:
+                distance[spot] = new
+                if not waiting[spot]:
+                    waiting[spot] = 1
+                    queue[tail] = spot
+                    tail = tail + 1 if tail + 1 < size else 0
+    return distance.reshape(mask.shape)
+
+
+@njit(cache=True)
+def _neighbours(width: int) -> tuple[Places, NDArray[np.float32]]:
+    """Return where the neighbours of a pixel are, flat, and how far away."""
+    beside = np.array([-width - 1, -width, -width + 1, -1])
+    far = np.array([1.41421356, 1.0, 1.41421356, 1.0], np.float32)
+    return np.append(beside, -beside[::-1]), np.append(far, far[::-1])

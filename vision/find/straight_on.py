@@ -84,8 +84,7 @@ def straight_on(sets: LevelSets, light: Array, touching: set[int]) -> Way:
         leads round into what crosses the thing.
     """
     after, height = _tree(sets)
-    roots = np.flatnonzero(sets.level == 0)
-    way = [int(roots[np.argmax(height[roots])])]
+    way = [_highest(np.flatnonzero(sets.level == 0).tolist(), height)]
     crossed: list[tuple[int, int]] = []
     passed: list[int] = []
     barred = False
@@ -114,11 +113,8 @@ def straight_on(sets: LevelSets, light: Array, touching: set[int]) -> Way:
 def _corner(centres: Array) -> int | None:
     """Return where a way turns sharply: into what crosses the rod aslant."""
     chords = centres[_LAG:] - centres[:-_LAG]
-    turns = [
-        abs(_turn(one, other))
-        for one, other in zip(chords[:-_LAG], chords[_LAG:], strict=True)
-    ]
-    if max(turns, default=0.0) < _SHARP:
+    turns = np.abs(turn(chords[:-_LAG], chords[_LAG:]))
+    if turns.max(initial=0.0) < _SHARP:
         return None
     return int(np.argmax(turns)) + _LAG
 
@@ -127,14 +123,15 @@ def _near(way: list[int], place: int) -> list[int]:
     return way[max(place - _LAG, 1) : place + _LAG + 1]
 
 
-def _tree(sets: LevelSets) -> tuple[list[list[int]], NDArray[np.intp]]:
+def _tree(sets: LevelSets) -> tuple[list[list[int]], list[int]]:
     """Return the parts after each, and the levels that follow it."""
-    after: list[list[int]] = [[] for _ in sets.before]
-    height = np.zeros(len(sets.before), np.intp)
-    for part in np.argsort(-sets.level, kind="stable"):
-        before = sets.before[part]
+    all_before = sets.before.tolist()
+    after: list[list[int]] = [[] for _ in all_before]
+    height = [0] * len(all_before)
+    for part in np.argsort(-sets.level, kind="stable").tolist():
+        before = all_before[part]
         if before >= 0:
-            after[before].append(int(part))
+            after[before].append(part)
             height[before] = max(height[before], height[part] + 1)
     return after, height
 
@@ -157,19 +154,19 @@ def _ways_from(at: int, sets: LevelSets, after: list[list[int]]) -> list[list[in
     return [way[1:] for way in (*ended, *open_ways)]
 
 
-def _highest(parts: list[int], height: NDArray[np.intp]) -> int:
+def _highest(parts: list[int], height: list[int]) -> int:
     """Return the part that most levels follow."""
-    return max(parts, key=lambda part: height[part])
+    return max(parts, key=height.__getitem__)
 
 
-def _end(part: int, after: list[list[int]], height: NDArray[np.intp]) -> int:
+def _end(part: int, after: list[list[int]], height: list[int]) -> int:
     """Return the end of the longest way from a part on."""
     while after[part]:
         part = _highest(after[part], height)
     return part
 
 
-def _branches(way: list[int], after: list[list[int]], height: NDArray[np.intp]) -> int:
+def _branches(way: list[int], after: list[list[int]], height: list[int]) -> int:
     """Return the place of the last part on a way at which an arm branches off."""
     at = [
         k
@@ -195,12 +192,12 @@ def _straightest(
         end = arm[-1]
         far = (sets.level[end] - sets.level[recent[0]]) * sets.step
         x, y, _, _ = predict(path, far)
-        turn = abs(_turn(sets.centres[end] - path[0], np.array([x, y]) - path[0]))
-        astray = turn + _OTHER_LIGHT * abs(light[end] - own)
+        off = abs(float(turn(sets.centres[end] - path[0], np.array([x, y]) - path[0])))
+        astray = off + _OTHER_LIGHT * abs(light[end] - own)
         others = [other for other in arms if other is not arm]
         if len(others) == 2:
             astray += _bend(*(sets.centres[other] for other in others))
-        if turn < _ASTRAY and astray < best:
+        if off < _ASTRAY and astray < best:
             best, found = astray, arm
     return found
 
@@ -210,12 +207,13 @@ def _bend(one: Array, other: Array) -> float:
     half = slice(min(len(one), len(other)) // 2, None)
     inwards, outwards = one[half][0] - one[-1], other[-1] - other[half][0]
     across = other[half][0] - one[half][0]
-    return abs(_turn(inwards, across)) + abs(_turn(across, outwards))
+    return float(abs(turn(inwards, across)) + abs(turn(across, outwards)))
 
 
-def _turn(one: Array, other: Array) -> float:
-    """Return the angle from one direction to another, rad."""
-    return float(np.arctan2(one[0] * other[1] - one[1] * other[0], one @ other))
+def turn(one: Array, other: Array) -> Array:
+    """Return the angle from directions to others, (..., 2), rad."""
+    (x, y), (u, v) = one.T, other.T
+    return np.asarray(np.arctan2(x * v - y * u, x * u + y * v))
 
 
 def _way(

@@ -10,7 +10,7 @@ from ..curve.robust import median
 from ..edge.state import Root
 from .binarise import Binary
 from .candidate import Candidate
-from .level_sets import LevelSets, level_sets
+from .level_sets import LevelSets, Places, level_sets
 from .straight_on import Way, straight_on
 
 Mask = NDArray[np.uint8]
@@ -47,20 +47,20 @@ def traced(
     ways: list[tuple[LevelSets, Way]] = []
     found: list[Candidate] = []
 
-    def follow(seeds: Mask | None, root: Root) -> bool:
+    def follow(seeds: Places | None, root: Root) -> bool:
         """Add what begins at an end; tell whether anything crosses it."""
         sets = level_sets(piece, seeds, half)
         if sets is None:
             return False
         x, y = np.rint(sets.centres + place).astype(int).T
         light = np.asarray(binary.ratio[y, x], np.float64)
-        touching = {int(part) for mask in held for part in sets.parts_at(mask)}
+        touching = set().union(*map(sets.parts_at, held))
         way = straight_on(sets, light, touching)
         if len(way.points) < 2:
             return way.branched
         at_clamp, at_border = (
-            [mask for mask in masks if mask is seeds or _lies_on(mask, way, sets)]
-            for masks in (held, leaving)
+            [spot for spot in spots if spot is seeds or _lies_on(spot, way, sets)]
+            for spots in (held, leaving)
         )
         part = _candidate(way, place, half, binary, root, len(at_clamp), len(at_border))
         held_there = root == "free" and (at_clamp or at_border)
@@ -75,15 +75,15 @@ def traced(
             follow(seeds, root)
     for sets, way in tuple(ways):
         for part in way.passed[:_MOST_ACROSS]:
-            seeds = sets.where(part, piece.shape)
+            seeds = sets.where(part)
             if not any(_lies_on(seeds, way, sets) for sets, way in ways):
                 follow(seeds, "free")
     return found
 
 
-def _lies_on(mask: Mask, way: Way, sets: LevelSets) -> bool:
-    """Whether a mask touches any of the parts that a way leads through."""
-    return not set(way.parts).isdisjoint(sets.parts_at(mask).tolist())
+def _lies_on(places: Places, way: Way, sets: LevelSets) -> bool:
+    """Whether places touch any of the parts that a way leads through."""
+    return not sets.parts_at(places).isdisjoint(way.parts)
 
 
 def _candidate(
@@ -108,22 +108,19 @@ def _candidate(
     )
 
 
-def _contacts(both: Mask) -> list[Mask]:
-    """Return the places where two masks meet, each as a mask."""
+def _contacts(both: Mask) -> list[Places]:
+    """Return the places (row, column) where two masks meet, those that touch as one."""
     x, y, w, h = cv2.boundingRect(both)
     if w == 0:
         return []
     # Far fewer pixels than the whole, and a frame for them to grow into.
-    box = (slice(y, y + h), slice(x, x + w))
     small = np.zeros((h + 4, w + 4), np.uint8)
-    small[2:-2, 2:-2] = both[box]
+    small[2:-2, 2:-2] = both[y : y + h, x : x + w]
     count, labels = cv2.connectedComponents(_grown(small))
-    places = []
-    for label in range(1, count):
-        place = np.zeros_like(both)
-        place[box] = both[box] & (labels[2:-2, 2:-2] == label)
-        places.append(place)
-    return places
+    places = np.argwhere(small)
+    label = labels[tuple(places.T)]
+    places += [y - 2, x - 2]
+    return [places[label == k] for k in range(1, count)]
 
 
 def _grown(mask: Mask) -> Mask:
