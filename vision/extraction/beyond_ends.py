@@ -123,7 +123,7 @@ def _on_paper(strips: list[Strip], refined: Refined) -> bool:
         along = strip.between(0.0, refined.fit.curve.s[-1])
         behind = strip.between(-_BEHIND[1] * width, -_BEHIND[0] * width)
         paper = quantile(sides[:, :, along].ravel(), 0.8)
-        off.append(np.median(sides[:, :, behind], axis=(1, 2)) - paper)
+        off.append([median(side[:, behind].ravel()) - paper for side in sides])
         rod.append(paper - median(strip.lanes(0.0)[0, along]))
         ground.append(paper)
     away, least = np.linalg.norm(off, axis=0), _OTHER * np.linalg.norm(rod)
@@ -139,8 +139,9 @@ def _tip_at_body(strip: Strip, refined: Refined) -> bool:
     paper = quantile(_sides(strip, refined)[:, :, fore].ravel(), 0.5)
     contrast = paper - median(strip.lanes(0.0)[0, fore])
     near = end + clear_of(refined.blur) + 1.0
+    body = strip.between(near, near + _BODY_PX)
     across = strip.lanes(*np.linspace(-_WIDE, _WIDE, 7))
-    level = np.median(across[:, strip.between(near, near + _BODY_PX)], axis=1)
+    level = np.array([median(lane[body]) for lane in across])
     dark = np.all(paper - level > _BODY_DARK * contrast)
     return bool(dark and np.ptp(level) < _EVEN * contrast)
 

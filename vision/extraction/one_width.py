@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..curve.robust import quantile
 from ..measurement import Measurement
 from .setting import arc_mm
 
@@ -42,7 +43,7 @@ def is_uneven(result: Measurement) -> bool:
     if use.sum() < _LEAST:
         return False
     width, s, theta = width[use], s[use], points["theta_rad"][use]
-    low, middle, high = np.quantile(width, [0.05, 0.5, 0.95])
+    low, middle, high = (quantile(width, part) for part in (0.05, 0.5, 0.95))
     if high - low < UNEVEN * middle:
         return False
     taper = _explained(width, s)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.jit import njit
 from ..curve.curve import Curve
 from ..curve.robust import median, quantile
 from ..edge.flank import median_profiles
@@ -23,7 +24,7 @@ from ..find.candidate import Candidate
 from ..find.ground import View
 from ..find.track import smooth_curve, start_curve
 from .matt import Streak, matt
-from .strip import Strip, profiles
+from .strip import Strip
 
 Array = NDArray[np.float64]
 
@@ -74,17 +75,26 @@ def is_parted(strip: Strip) -> bool:
     strip : Strip
         Along a rod, or along the part of one on one side of a streak.
     """
-    light = profiles(strip)
-    seen = ~np.isnan(light)
-    low, high = np.where(seen, light, np.inf), np.where(seen, light, -np.inf)
-    span = high.max(axis=1) - low.min(axis=1)
     middle = int(np.searchsorted(strip.across, 0.0))
-    for side in (slice(middle, None, -1), slice(middle, None)):
-        lightest = np.maximum.accumulate(high[:, side], axis=1)
-        falls = np.max(lightest - low[:, side], axis=1) > _DEEP * span
-        if np.mean(falls) >= _MOST_PARTS:
-            return True
-    return False
+    fall = _falls(strip.profiles, middle)
+    return bool((np.mean(fall > _DEEP, axis=1) >= _MOST_PARTS).any())
+
+
+@njit(cache=True, error_model="numpy")
+def _falls(profiles: Array, middle: int) -> Array:
+    """Return by how much light falls at most outwards on each side, over its span."""
+    most = np.zeros((2, len(profiles)))
+    for k in range(len(profiles)):
+        span = np.nanmax(profiles[k]) - np.nanmin(profiles[k])
+        for side in range(2):
+            outwards = profiles[k, middle:] if side else profiles[k, middle::-1]
+            lightest = -np.inf
+            for light in outwards:
+                if light > lightest:
+                    lightest = light
+                elif lightest - light > most[side, k] * span:
+                    most[side, k] = (lightest - light) / span
+    return most
 
 
 def whole_rod(view: View, candidate: Candidate) -> tuple[View, Candidate]:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.jit import njit
 from ..curve.robust import median
 from ..edge.step_line import sample_lanes
 from ..find.candidate import Candidate
@@ -38,7 +40,7 @@ ASIDE, BEHIND, BEYOND = 3.5, 6.0, 10.0
 """How far from its axis, its root and its tip they go, in widths."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Strip:
     """Light on lanes beside an axis.
 
@@ -65,6 +67,13 @@ class Strip:
     across: Array
     light: Array
 
+    @cached_property
+    def profiles(self) -> Array:
+        """The mean light across each part of a candidate, shape (PARTS, k)."""
+        parts = self.light.reshape(len(self.across), PARTS, -1)
+        share = np.full(parts.shape[2], 1.0 / parts.shape[2])
+        return np.ascontiguousarray((parts @ share).T)
+
     def beside(self, offset: Array) -> Array:
         """Return points at offsets from the axis, px, shape (n,), as (n, 2)."""
         normals = np.column_stack([-np.sin(self.theta), np.cos(self.theta)])
@@ -72,18 +81,18 @@ class Strip:
 
     def between(self, first: float, last: float) -> slice:
         """Return the stations from one arc length to another, the nearest at least."""
-        low, high = _nearest(self.s, first), _nearest(self.s, last)
+        low, high = _nearest(self.s, first, last).tolist()
         return slice(low, high + 1)
 
     def lanes(self, *across: float) -> Array:
         """Return the light on the lanes nearest to offsets in widths, (m, n)."""
-        return np.asarray(self.light[[_nearest(self.across, x) for x in across]])
+        return np.asarray(self.light[_nearest(self.across, *across)])
 
 
-def _nearest(grid: Array, value: float) -> int:
-    """Return the index of the value of an even grid that is nearest."""
-    place = round((value - grid[0]) / (grid[1] - grid[0]))
-    return int(min(max(place, 0), len(grid) - 1))
+def _nearest(grid: Array, *values: float) -> NDArray[np.intp]:
+    """Return the indices of the values of an even grid that are nearest."""
+    places = np.rint((np.array(values) - grid[0]) / (grid[1] - grid[0]))
+    return np.asarray(places.clip(0, len(grid) - 1), np.intp)
 
 
 def _sampled(
@@ -105,37 +114,44 @@ def along_candidate(view: View, candidate: Candidate) -> Strip:
     return _sampled(view, width, s[few], points[few], theta[few], across)
 
 
-def profiles(strip: Strip) -> Array:
-    """Return the mean light across each part of a candidate, shape (PARTS, k)."""
-    parts = strip.light.reshape(len(strip.across), PARTS, -1)
-    return np.ascontiguousarray(parts.mean(axis=2).T)
-
-
 def blur_of(strip: Strip) -> tuple[float, float, float]:
     """Return blur, width, and how much that jumps, px, as the sides' slopes show them.
 
     A step that is blurred by b rises from a quarter to three quarters of its height
     over 1.35 b; of a rod that is hardly wider than its blur, less of both is seen.
     """
-    light, columns = strip.light.T, np.arange(len(strip.across))
     step = strip.width * (strip.across[1] - strip.across[0])
-    inside = np.where(np.abs(strip.across) < _INSIDE, light, np.nan)
-    axis = np.argmin(np.where(np.isnan(inside), np.inf, inside), axis=1)[:, None]
-    dark = np.take_along_axis(light, axis, axis=1)
-    away = step * (columns - axis)
-    reach = step * len(columns)
-    rises, width = np.full((2, len(light)), np.inf), np.zeros(len(light))
-    for side, outwards in enumerate((-1.0, 1.0)):
-        beside = np.where(outwards * away >= 0.0, light, np.nan)
-        height = np.fmax.reduce(beside, axis=1)[:, None] - dark
-        quarter, half, most = (
-            np.where(beside > dark + part * height, np.abs(away), reach).min(axis=1)
-            for part in (0.25, 0.5, 0.75)
-        )
-        width += half
-        rises[side] = most - quarter
-    jumps = np.minimum(np.abs(np.diff(width)), 0.5 * median(width))
-    return median(rises.min(axis=0)) / _QUARTILES, median(width), float(jumps.mean())
+    first, end = np.searchsorted(strip.across, (-_INSIDE, _INSIDE)).tolist()
+    quarter, half, most = step * _sides(strip.light, first, end)
+    width, typical = half.sum(axis=0), median(half.sum(axis=0))
+    jumps = np.minimum(np.abs(np.diff(width)), 0.5 * typical)
+    rises = (most - quarter).min(axis=0)
+    return median(rises) / _QUARTILES, typical, float(jumps.mean())
+
+
+@njit(cache=True)
+def _sides(light: Array, first: int, end: int) -> Array:
+    """Return how many lanes from the axis each side rises by a quarter, half and more.
+
+    The axis is the darkest lane from `first` to `end`. Shape (3, 2, n).
+    """
+    lanes, stations = light.shape
+    away = np.full((3, 2, stations), float(lanes))
+    for k in range(stations):
+        axis = first
+        for i in range(first, end):
+            if not light[i, k] >= light[axis, k]:
+                axis = i
+        for side in range(2):
+            beside = light[axis:, k] if side else light[axis::-1, k]
+            height = np.nanmax(beside) - beside[0]
+            for part in range(3):
+                level = beside[0] + 0.25 * (part + 1) * height
+                for i in range(beside.size):
+                    if beside[i] > level:
+                        away[part, side, k] = i
+                        break
+    return away
 
 
 def along_rod(view: View, refined: Refined) -> Strip:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..curve.robust import median
 from ..edge.edges import clear_of
 from ..find.candidate import Candidate
-from .strip import PARTS, Strip, profiles
+from .strip import PARTS, Strip
 
 Array = NDArray[np.float64]
 
@@ -54,7 +54,7 @@ def rod_alone(strip: Strip, candidate: Candidate, width: float) -> Candidate | N
     clear = clear_of(1.0)
     across = strip.across * strip.width
     near = np.abs(across) < 0.6 * width + 2.0 * clear
-    across, light = across[near], profiles(strip)[:, near]
+    across, light = across[near], strip.profiles[:, near]
     dark, paper = light.min(axis=1), light.max(axis=1)
     body = light < (dark + _EDGE * (paper - dark))[:, None]
     low, high = across[body.argmax(axis=1)], across[-1 - body[:, ::-1].argmax(axis=1)]

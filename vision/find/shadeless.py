@@ -93,10 +93,13 @@ def in_its_colour(photo: Photo, rod: Candidate, view: View) -> tuple[Candidate, 
     view : View
         Without a shade it is the lightness that the colours have together.
     """
+    paper = _paper_colour(photo)
+    if paper is None:
+        return rod, view
     points, normals, across = _lanes(rod)
     spots = points[:, None] + across[:, None] * normals[:, None]
-    paper, glance = _paper_colour(photo), photo.colour_at(spots[::_FEW, ::2])
-    if paper is None or glance is None or not _tinted(glance / paper).any():
+    glance = np.asarray(photo.colour_at(spots[::_FEW, ::2]))
+    if not _tinted(glance / paper).any():
         return rod, view  # as most rods, at little cost
     light = np.asarray(photo.colour_at(spots))
     share = light / paper
