@@ -129,11 +129,9 @@ def open_bench(
 
 
 def _clock(twin_seed: int | None, speed: float | None) -> Clock:
-    from ..rig import ScaledClock, SteppedClock, SystemClock
+    from ..rig import SteppedClock, SystemClock
 
-    if twin_seed is None:
-        return SystemClock()
-    return SteppedClock() if speed is None else ScaledClock(speed)
+    return SystemClock() if twin_seed is None else SteppedClock(speed=speed)
 
 
 @contextlib.contextmanager

@@ -101,9 +101,15 @@ class SteppedClock:
     ----------
     start_utc : datetime, optional
         The UTC time it begins at; by default the system's.
+    speed : float, optional
+        Its seconds in one second of the system's: a demonstration to look at. What
+        the processor needs beside them counts for nothing. By default no sleep lasts.
     """
 
-    def __init__(self, start_utc: datetime | None = None) -> None:
+    def __init__(
+        self, start_utc: datetime | None = None, *, speed: float | None = None
+    ) -> None:
+        self._s_each = 0.0 if speed is None else 1.0 / positive(speed, "speed")
         self._now_s = 0.0
         self._start_utc = start_utc or datetime.now(UTC)
 
@@ -116,5 +122,6 @@ class SteppedClock:
         return self._start_utc + timedelta(seconds=self._now_s)
 
     def sleep(self, duration_s: float) -> None:
-        """Move on by `duration_s` at once."""
+        """Move on by `duration_s`."""
+        time.sleep(max(duration_s, 0.0) * self._s_each)
         self._now_s += max(duration_s, 0.0)

@@ -100,7 +100,7 @@ def interrupt(
     plan: Path, out: Path, delay_s: float, number: int, *, line: str = ""
 ) -> tuple[int, float]:
     """Signal a run `delay_s` after it printed `line`; return exit code and seconds."""
-    with start(plan, out, "--pace", "0.2") as process:
+    with start(plan, out, "--speed", "5") as process:
         while line and not process.stdout.readline().startswith(line):
             pass
         time.sleep(delay_s)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import time
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from magbend.core.errors import CameraError
 from magbend.rig.bench.config import SettleConfig
 from magbend.rig.camera.protocol import Frame
 from magbend.rig.clock import SteppedClock
-from magbend.rig.runs.settle import change_percent, settle
+from magbend.rig.runs.settle import Settled, change_percent, settle
 from magbend.rig.virtual.camera import VirtualCamera
 
 CONFIG = SettleConfig(
@@ -78,6 +79,22 @@ def test_a_turning_point_is_not_stillness(swing_Hz: float) -> None:
     settled = settle(camera, clock, short)
     assert settled.status == "timeout"
     assert settled.time_s < 13.0
+
+
+def test_a_busy_processor_times_nothing_out_on_a_fast_twin() -> None:
+    def settled(clock: SteppedClock) -> Settled:
+        still = picture(60.0, np.random.default_rng(4))
+
+        def slow(gap_mm: float, time_s: float) -> np.ndarray:
+            time.sleep(0.005)
+            return still
+
+        return settle(VirtualCamera(slow, lambda: 1.0, clock), clock, CONFIG)
+
+    fast = SteppedClock(speed=1e4)
+    start_s = time.monotonic()
+    assert settled(fast) == settled(SteppedClock())
+    assert time.monotonic() - start_s > fast.monotonic_s() / 1e4
 
 
 def test_the_fixed_time_always_passes() -> None:

@@ -1,12 +1,11 @@
 """Run a plan on the twin with tiny pictures: what the tests kill and interrupt.
 
-Usage: twin_run.py PLAN OUT [--resume] [--pace S]
+Usage: twin_run.py PLAN OUT [--resume] [--speed N]
 """
 
 from __future__ import annotations
 
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -22,19 +21,6 @@ GENERATOR = np.random.default_rng(8)
 NOISE = GENERATOR.normal(0.0, 1.5, (8, 96, 128))
 
 
-class PacedClock(SteppedClock):
-    """The twin's time, at `pace` real seconds a second, in sleeps that can be cut."""
-
-    def __init__(self, pace: float) -> None:
-        super().__init__()
-        self._pace = pace
-
-    def sleep(self, duration_s: float) -> None:
-        super().sleep(duration_s)
-        if self._pace:
-            time.sleep(max(duration_s, 0.0) * self._pace)
-
-
 def render(gap_mm: float, time_s: float) -> np.ndarray:
     """A dark bar on noisy paper, at a row that depends on the gap."""
     cover = np.clip(4.5 - np.abs(np.arange(96)[:, None] - gap_mm + 20.0), 0.0, 1.0)
@@ -45,8 +31,9 @@ def render(gap_mm: float, time_s: float) -> np.ndarray:
 def main() -> int:
     plan = read_plan(Path(sys.argv[1]))
     out = Path(sys.argv[2])
-    pace = float(sys.argv[sys.argv.index("--pace") + 1]) if "--pace" in sys.argv else 0
-    clock = PacedClock(pace)
+    has_speed = "--speed" in sys.argv
+    speed = float(sys.argv[sys.argv.index("--speed") + 1]) if has_speed else None
+    clock = SteppedClock(speed=speed)
     log = WireLog(None, clock)
     print("ready", flush=True)
     with terminating():
