@@ -43,9 +43,9 @@ def lanes_over(place, skew, *, slope=0.0, noise=0.0, rng=None, blur=BLUR):
 
 
 def fitted(light):
-    crossing = crossings_of(light, S, 0.0, 2.4, 10.0, 4.0, reach=6.0)
-    line = line_through(ACROSS, crossing)
-    return fit_step(light, S, ACROSS, line, crossing, blur=BLUR, inner=10.0, outer=6.0)
+    crossing = crossings_of(light, S, 0.0, 2.4, 10.0, 4.0, 6.0)
+    seen = line_through(light, S, ACROSS, crossing)
+    return fit_step(seen, blur=BLUR, inner=10.0, outer=6.0)
 
 
 @pytest.mark.parametrize("slope", [-0.02, 0.0, 0.02])
@@ -90,9 +90,9 @@ def test_lane_with_a_speck_at_the_end_counts_for_nothing():
 
 def test_lines_at_the_clamp_weigh_as_their_steps_squared_and_as_they_are_seen():
     """The front is seen over three widths of the rod, the face over 0.6."""
-    alike = ClampLines(face=replace(LINE, rise=0.2), front=replace(LINE, rise=0.2))
+    alike = ClampLines(face=LINE._replace(rise=0.2), front=LINE._replace(rise=0.2))
     assert between(1.0, 2.0, alike) == pytest.approx(1.0 + 5.0 / 6.0)
-    higher = ClampLines(face=replace(LINE, rise=0.1), front=replace(LINE, rise=0.3))
+    higher = ClampLines(face=LINE._replace(rise=0.1), front=LINE._replace(rise=0.3))
     assert between(1.0, 2.0, higher) == pytest.approx(1.0 + 45.0 / 46.0)
     unknown = ClampLines(face=LINE, front=LINE)
     assert between(1.0, 2.0, unknown) == pytest.approx(1.5)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,7 @@ from ...core.jit import njit
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Curve:
+class Curve(NamedTuple):
     """A fitted curve on an even grid of arc length.
 
     Parameters
@@ -50,24 +49,21 @@ class Curve:
     def reversed(self) -> Curve:
         """Return the same curve from its end on, where s is 0 less what it was."""
         return Curve(
-            s=-self.s[::-1], points=self.points[::-1], theta=self.theta[::-1] + np.pi,
-            kappa=-self.kappa[::-1],
+            s=-self.s[::-1], points=self.points[::-1].copy(),
+            theta=self.theta[::-1] + np.pi, kappa=-self.kappa[::-1],
         )  # fmt: skip
 
     def at(self, s: Array) -> tuple[Array, Array]:
         """Return points (n, 2) and angles (n,) at any s; beyond the ends an arc."""
-        s = np.ascontiguousarray(s, dtype=np.float64)
-        points, theta = np.empty((len(s), 2)), np.empty(len(s))
-        _evaluate(s, self.s, self.points, self.theta, self.kappa, points, theta)
+        points, theta = points_at(self, np.ascontiguousarray(s, dtype=np.float64))
         return points, theta
 
 
 @njit(cache=True)
-def _evaluate(
-    at: Array, s: Array, points: Array, theta: Array, kappa: Array,
-    out: Array, angle: Array,
-) -> None:  # fmt: skip
-    """Points and angles of a curve: curvature linear between stations."""
+def points_at(curve: Curve, at: Array) -> tuple[Array, Array]:
+    """Return points and angles of a curve, as `Curve.at`: curvature runs straight."""
+    s, points, theta, kappa = curve
+    out, angle = np.empty((at.size, 2)), np.empty(at.size)
     last = s.size - 1
     step = s[1] - s[0]
     for i in range(at.size):
@@ -86,3 +82,4 @@ def _evaluate(
             x, y = x + beyond * np.cos(middle), y + beyond * np.sin(middle)
             turned += beyond * bend
         out[i, 0], out[i, 1], angle[i] = x, y, turned
+    return out, angle

@@ -9,7 +9,7 @@ along the rod; `extract` corrects for that, knowing the camera.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +21,12 @@ from .edges import clear_of
 from .step_line import (
     SPAN,
     STEP_PX,
+    Crossed,
     EndFace,
     crossings_of,
     fit_step,
     lanes,
+    lanes_along,
     line_through,
 )
 
@@ -67,7 +69,7 @@ class ClampLines:
     def shifted(self, first: float) -> ClampLines:
         """Return the lines with arc length counted from `first`."""
         face, front = (
-            None if line is None else replace(line, s=line.s - first)
+            None if line is None else line._replace(s=line.s - first)
             for line in (self.face, self.front)
         )
         return ClampLines(face=face, front=front)
@@ -124,66 +126,64 @@ def find_clamp(
     """
     near = clear_of(blur)
     span = reach + near + max(8.0, SPAN * blur)
-    s = np.arange(expected - span, expected + span, STEP_PX)
-    return ClampLines(
-        face=_face(grey, curve, s, expected, width, blur, contrast, reach, sign, fine),
-        front=_front(
-            grey, curve, s, expected, width, blur, contrast, reach, sign, fine
-        ),
-    )
-
-
-def _face(
-    grey: Image, curve: Curve, s: Array, expected: float, width: float, blur: float,
-    contrast: float, reach: float, sign: float, fine: bool,
-) -> EndFace | None:  # fmt: skip
-    near = clear_of(blur)
-    across = _FACE_SEEN * _LANES * width
-    light = np.ascontiguousarray(lanes(grey, curve, s, across, sign)[:, ::-1])
-    place = _steepest(light, -s[::-1], -expected, reach, 0.12 * contrast)
-    if np.isnan(place):
-        return None
-    place = _end_of_dark(light, -s[::-1], place, 0.12 * contrast)
-    crossing = crossings_of(light, -s[::-1], place, near, 3.0, 4.0, reach=4.0)
-    line = line_through(across, crossing)
-    if line is None:
-        return None
-    if fine:
-        line = fit_step(
-            light, -s[::-1], across, line, crossing, blur=blur, inner=SPAN * blur,
-            outer=_CLAMP_SPAN * blur,
-        )  # fmt: skip
-    return replace(line, s=-line.s, skew=-line.skew)
-
-
-def _front(
-    grey: Image, curve: Curve, s: Array, expected: float, width: float, blur: float,
-    contrast: float, reach: float, sign: float, fine: bool,
-) -> EndFace | None:  # fmt: skip
-    near = clear_of(blur)
-    beside = (_BESIDE if fine else _BESIDE[::2]) * width + near + 3.0
-    crossings: list[Array] = []
-    offsets: list[Array] = []
-    seen: list[Array] = []
-    for across in (-beside[::-1], beside):
-        light = lanes(grey, curve, s, across, sign)
-        place = _steepest(light, s, expected, reach, 0.15 * contrast)
-        if np.isnan(place):
-            continue
-        crossings.append(crossings_of(light, s, place, near, 3.0, 4.0, reach=4.0))
-        offsets.append(across)
-        seen.append(light)
-    if not offsets:
-        return None
-    across, crossing = np.concatenate(offsets), np.concatenate(crossings)
-    line = line_through(across, crossing)
-    if line is None or not fine:
-        return line
     wide = max(blur, _LEAST_PX)
-    return fit_step(
-        np.concatenate(seen), s, across, line, crossing, blur=blur,
-        inner=_CLAMP_SPAN * wide, outer=SPAN * wide, own=True,
+    face = fit_step(
+        _face(grey, curve, expected, span, width, near, contrast, reach, sign),
+        blur=blur, inner=SPAN * blur, outer=_CLAMP_SPAN * blur, fine=fine,
     )  # fmt: skip
+    if face is not None:
+        face = face._replace(s=-face.s, skew=-face.skew)
+    front = fit_step(
+        _front(
+            grey, curve, expected, span, (_BESIDE if fine else _BESIDE[::2]) * width,
+            near, contrast, reach, sign,
+        ),
+        blur=blur, inner=_CLAMP_SPAN * wide, outer=SPAN * wide, own=True, fine=fine,
+    )  # fmt: skip
+    return ClampLines(face=face, front=front)
+
+
+@njit(cache=True)
+def _face(
+    grey: Image, curve: Curve, expected: float, span: float, width: float, near: float,
+    contrast: float, reach: float, sign: float,
+) -> Crossed:  # fmt: skip
+    """Return lanes on the rod, out of the clamp's end: their s falls into the clamp."""
+    s = -np.arange(expected - span, expected + span, STEP_PX)[::-1]
+    across = _FACE_SEEN * _LANES * width
+    light = lanes_along(grey, curve, -s, across, sign)
+    place = _steepest(light, s, -expected, reach, 0.12 * contrast)
+    if not np.isnan(place):
+        place = _end_of_dark(light, s, place, 0.12 * contrast)
+    crossing = crossings_of(light, s, place, near, 3.0, 4.0, 4.0)
+    crossed: Crossed = line_through(light, s, across, crossing)
+    return crossed
+
+
+@njit(cache=True)
+def _front(
+    grey: Image, curve: Curve, expected: float, span: float, beside: Array, near: float,
+    contrast: float, reach: float, sign: float,
+) -> Crossed:  # fmt: skip
+    """Return lanes on the sides of a rod where the clamp's front is seen."""
+    s = np.arange(expected - span, expected + span, STEP_PX)
+    beside = beside + near + 3.0
+    across = np.concatenate((-beside[::-1], beside))
+    light = lanes_along(grey, curve, s, across, sign)
+    count = beside.size
+    sides = light[:count], light[count:]
+    left, right = [_steepest(x, s, expected, reach, 0.15 * contrast) for x in sides]
+    crossing = np.concatenate((
+        crossings_of(sides[0], s, left, near, 3.0, 4.0, 4.0),
+        crossings_of(sides[1], s, right, near, 3.0, 4.0, 4.0),
+    ))  # fmt: skip
+    # A side on which nothing rises does not count as one whose lanes do not cross.
+    first = count if np.isnan(left) else 0
+    last = count if np.isnan(right) else across.size
+    crossed: Crossed = line_through(
+        light[first:last], s, across[first:last], crossing[first:last]
+    )
+    return crossed
 
 
 def goes_on_at(grey: Image, curve: Curve, s: Array, width: float) -> bool:

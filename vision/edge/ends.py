@@ -188,7 +188,7 @@ def _to_end_of_face(tip: EndFace, state: State, seen: Seen, walls: Walls) -> End
     light = wall_light(wall, away, state.width, top, paper, level, MIRRORED, SKY)
     blur = math.sqrt(2.0) * (tip.blur or state.blur)
     short = short_of_end(wall, light, blur, float(wall[0]), 1.0)
-    return replace(tip, s=tip.s + float(short[0]))
+    return tip._replace(s=tip.s + float(short[0]))
 
 
 def _first(lines: ClampLines, face_px: float) -> float:

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 WHITE = 0.97
 """Light of what is as light as a picture can tell, but for noise."""
 
-_HELD = 1.0 + 1e-5
+HELD = 1.0 + 1e-5
 
 _NODES = np.array([-2.0, -1.0, 0.0, 1.0, 2.0]) * 0.412
 _SHARES = np.array([0.06, 0.25, 0.38, 0.25, 0.06])
@@ -76,7 +76,7 @@ def is_held(light: NDArray[np.floating]) -> bool:
 
     Where paper was made 1, as by division by an empty picture, noise exceeds it.
     """
-    return bool(WHITE < np.fmax.reduce(light, axis=None) <= _HELD)
+    return bool(WHITE < np.fmax.reduce(light, axis=None) <= HELD)
 
 
 @njit(cache=True)

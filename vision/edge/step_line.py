@@ -7,16 +7,16 @@ crossings; a blurred step along such a line, fitted to all samples near it, is t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.jit import njit
-from ..curve.curve import Curve
+from ..curve.curve import Curve, points_at
 from ..curve.robust import median
 from .edges import _bilinear
-from .flank import WHITE, fit_flanks, is_held, median_profiles
+from .flank import HELD, WHITE, fit_flanks, median_profiles
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -39,8 +39,7 @@ tell as much as one."""
 _LEAST_PIVOT = 1e-6
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EndFace:
+class EndFace(NamedTuple):
     """Where lanes along a rod cross an end.
 
     Parameters
@@ -75,6 +74,32 @@ class EndFace:
         return math.hypot(LINE_SIGMA * self.sigma, LINE_BLUR * self.blur)
 
 
+class Crossed(NamedTuple):
+    """Lanes along a rod where they cross an end.
+
+    Parameters
+    ----------
+    light : ndarray, shape (k, m)
+        Lanes, as from `lanes`.
+    s : ndarray, shape (m,)
+        Even grid of arc length, rising from rod to paper.
+    across, crossing : ndarray, shape (k,)
+        Offsets of the lanes, and where they cross half level; NaN where one does not.
+    line : EndFace
+        Through the crossings; its place is NaN where fewer than half of the lanes
+        cross.
+    """
+
+    light: Array
+    s: Array
+    across: Array
+    crossing: Array
+    line: EndFace
+
+
+NOT_SEEN = EndFace(np.nan, np.nan, np.nan, np.nan, 0.0, 0.0, 0.0, np.nan)
+
+
 def lanes(
     grey: Image, curve: Curve, s: Array, across: Array, sign: float = 1.0
 ) -> Array:
@@ -98,22 +123,24 @@ def lanes(
     ndarray, shape (k, m)
         Light; NaN outside the picture.
     """
-    return sample_lanes(grey, *curve.at(s), across, sign)
+    return np.asarray(lanes_along(grey, curve, s, across, sign))
 
 
+@njit(cache=True)
+def lanes_along(
+    grey: Image, curve: Curve, s: Array, across: Array, sign: float
+) -> Array:
+    """Sample lanes along a curve, as `lanes` does."""
+    points, theta = points_at(curve, s)
+    return np.asarray(sample_lanes(grey, points, theta, across, sign))
+
+
+@njit(cache=True)
 def sample_lanes(
     grey: Image, points: Array, theta: Array, across: Array, sign: float
 ) -> Array:
     """Sample lanes beside points, as `lanes` does, where the axis has given angles."""
-    light = np.empty((len(across), len(points)))
-    _sample_lanes(grey, points, theta, across, sign, light)
-    return light
-
-
-@njit(cache=True)
-def _sample_lanes(
-    grey: Image, points: Array, theta: Array, across: Array, sign: float, light: Array
-) -> None:
+    light = np.empty((across.size, len(points)))
     height, width = grey.shape
     low, high = across.min(), across.max()
     for k in range(len(points)):
@@ -137,12 +164,13 @@ def _sample_lanes(
             continue
         for i in range(across.size):
             light[i, k] = sign * _bilinear(grey, x + across[i] * u, y + across[i] * v)
+    return light
 
 
 def fit_step(
-    light: Array, s: Array, across: Array, line: EndFace, crossing: Array, *,
-    blur: float, inner: float, outer: float, own: bool = False,
-) -> EndFace:  # fmt: skip
+    seen: Crossed, *, blur: float, inner: float, outer: float, own: bool = False,
+    fine: bool = True,
+) -> EndFace | None:  # fmt: skip
     """Return a line moved to where a blurred step fits the lanes best.
 
     Least squares of the step between two levels, the outer one with a slope, blurred by
@@ -154,16 +182,9 @@ def fit_step(
 
     Parameters
     ----------
-    light : ndarray, shape (k, m)
-        Lanes, as from `lanes`.
-    s : ndarray, shape (m,)
-        Even grid of arc length, rising from rod to paper.
-    across : ndarray, shape (k,)
-        Offsets of the lanes.
-    line : EndFace
-        Through the crossings at half level.
-    crossing : ndarray, shape (k,)
-        These; lanes that cross far from the line are left out.
+    seen : Crossed
+        Lanes, and the line through their crossings; those that cross far from the line
+        are left out.
     blur : float
         Standard deviation of the blur, px, about; how far the crossings scatter about
         the line comes on top.
@@ -173,50 +194,76 @@ def fit_step(
         Whether each lane has levels of its own, as where some lie in a shade: common
         ones would turn the line towards it. A lane then counts by the square of its
         step's height, and less the farther it is off.
+    fine : bool
+        Whether to fit; else the line through the crossings will do.
+
+    Returns
+    -------
+    EndFace or None
+        None where there is no line.
     """
-    wide = math.hypot(blur, line.scatter)
-    away = np.abs(crossing - line.s - line.skew * across)
-    near = away < 3.5 * (line.scatter + 0.02)
-    place, skew, fitted, rise, known, off = _fit_step(
-        light[near], s, across[near], line.s, line.skew, wide, inner, outer, own
-    )
-    if not (abs(place - line.s) < 2.0 * wide and known.any()):
+    line = seen.line
+    if math.isnan(line.s):
+        return None
+    if not fine:
         return line
-    share = known / known.sum()
-    line = replace(line, s=place, skew=skew, rise=float(share @ rise), blur=fitted)
-    if own:
-        line = _scattered(line, across[near], off, share)
-    return _to_whole_step(light[near], s, across[near], line, wide, inner, outer)
+    found, white = _fitted(seen, blur, inner, outer, own)
+    return _to_whole_step(seen, found, blur, inner, outer, white) if white else found
 
 
-def _scattered(line: EndFace, across: Array, off: Array, share: Array) -> EndFace:
-    """Return a line with the scatter of its lanes, and what that does to it."""
-    scatter = math.sqrt(share @ off**2)
-    middle = float(share @ across)
-    spread = float(share @ (across - middle) ** 2)
-    alone = math.sqrt(_ALIKE * float(share @ share))
-    sigma = scatter * alone + 0.005
-    return replace(
-        line, scatter=scatter, sigma=sigma * math.hypot(1.0, middle / spread**0.5),
-        skew_sd=sigma / math.sqrt(spread),
-    )  # fmt: skip
-
-
-def _to_whole_step(
-    light: Array, s: Array, across: Array, line: EndFace, blur: float, inner: float,
-    outer: float,
-) -> EndFace:  # fmt: skip
-    """Return a line beside what is white moved to where it is with all its light.
+@njit(cache=True)
+def _fitted(
+    seen: Crossed, blur: float, inner: float, outer: float, own: bool
+) -> tuple[EndFace, float]:
+    """Return the line fitted, and 1 or -1 where it lies beside what is white, else 0.
 
     Lanes of a light rod are negative: white lies before the line then.
     """
-    sign = 1.0 if is_held(light) else -1.0
-    if not is_held(sign * light):
-        return line
+    line, s = seen.line, seen.s
+    wide = np.hypot(blur, line.scatter)
+    light, across = _near(seen)
+    place, skew, fitted, rise, known, off = _fit_step(
+        light, s, across, line.s, line.skew, wide, inner, outer, own
+    )
+    if not (abs(place - line.s) < 2.0 * wide and np.any(known != 0.0)):
+        return line, 0.0
+    share = known / np.sum(known)
+    scatter, sigma, skew_sd = line.scatter, line.sigma, line.skew_sd
+    if own:
+        scatter = np.sqrt(np.sum(share * off**2))
+        middle = np.sum(share * across)
+        spread = np.sqrt(np.sum(share * (across - middle) ** 2))
+        alone = scatter * np.sqrt(_ALIKE * np.sum(share**2)) + 0.005
+        sigma, skew_sd = alone * np.hypot(1.0, middle / spread), alone / spread
+    height = np.sum(share * rise)
+    found = EndFace(place, sigma, skew, scatter, line.found, height, fitted, skew_sd)
+    white = 0.0
+    for sign in (1.0, -1.0):
+        if WHITE < np.nanmax(sign * light) <= HELD:
+            white = sign
+    return found, white
+
+
+@njit(cache=True)
+def _near(seen: Crossed) -> tuple[Array, Array]:
+    """Return the light on lanes that cross near the line, and their offsets."""
+    line, across = seen.line, seen.across
+    away = np.abs(seen.crossing - line.s - line.skew * across)
+    near = away < 3.5 * (line.scatter + 0.02)
+    return seen.light[near], across[near]
+
+
+def _to_whole_step(
+    seen: Crossed, line: EndFace, blur: float, inner: float, outer: float, sign: float
+) -> EndFace:
+    """Return a line beside what is white moved to where it is with all its light."""
+    light, across = _near(seen)
+    blur = math.hypot(blur, seen.line.scatter)
     x = np.arange(-inner, outer, STEP_PX)
     at = line.s + line.skew * across
     profiles = [
-        np.interp(place + x, s, lane) for place, lane in zip(at, light, strict=True)
+        np.interp(place + x, seen.s, lane)
+        for place, lane in zip(at, light, strict=True)
     ]
     (profile,) = median_profiles(np.array(profiles), np.array([0, len(profiles)]))
     if sign < 0.0:
@@ -225,7 +272,7 @@ def _to_whole_step(
         return line
     step = fit_flanks(x, profile[None], blur=blur, known=True)
     # What is cut off looks sharper than it is.
-    return replace(line, s=line.s + sign * float(step.moves()[0, 0]), blur=blur)
+    return line._replace(s=line.s + sign * float(step.moves()[0, 0]), blur=blur)
 
 
 @njit(cache=True, error_model="numpy")
@@ -332,21 +379,15 @@ def _eliminate(full: Array, heights: Array) -> None:
         heights[j - 3] = outer - inner
 
 
-def line_through(across: Array, crossing: Array) -> EndFace | None:
+@njit(cache=True)
+def line_through(light: Array, s: Array, across: Array, crossing: Array) -> Crossed:
     """Fit a line to lane crossings, the worst ones dropped."""
-    found = int(np.count_nonzero(np.isfinite(crossing)))
-    if found < 0.5 * len(crossing):
-        return None
-    place, slope, scatter, used, spread = _fit_line(across, crossing)
-    sigma = scatter / math.sqrt(used) + 0.005
-    return EndFace(
-        s=place,
-        sigma=sigma,
-        skew=slope,
-        skew_sd=sigma / spread,
-        scatter=scatter,
-        found=found / len(crossing),
-    )
+    line, found = NOT_SEEN, np.sum(np.isfinite(crossing))
+    if found > 0 and found >= 0.5 * crossing.size:
+        place, slope, scatter, used, spread = _fit_line(across, crossing)
+        sigma, part = scatter / np.sqrt(used) + 0.005, found / crossing.size
+        line = EndFace(place, sigma, slope, scatter, part, 0.0, 0.0, sigma / spread)
+    return Crossed(light, s, across, crossing, line)
 
 
 @njit(cache=True)
@@ -376,9 +417,10 @@ def _fit_line(across: Array, crossing: Array) -> tuple[float, float, float, int,
     return place, slope, np.sqrt(np.mean(left**2)), len(left), spread
 
 
+@njit(cache=True)
 def crossings_of(
     light: Array, s: Array, place: float, near: float, inner: float, outer: float,
-    *, reach: float,
+    reach: float,
 ) -> Array:  # fmt: skip
     """Return where lanes cross half level near `place`, going outwards (s rising).
 
@@ -389,7 +431,7 @@ def crossings_of(
     s : ndarray, shape (m,)
         Even grid of arc length.
     place, reach : float
-        Where to look, and how far to either side.
+        Where to look (nowhere if NaN), and how far to either side.
     near, inner, outer : float
         The level before is a mean over `inner`, the level behind a line through
         `outer` carried to `place`, both `near` px clear of it.
@@ -399,24 +441,15 @@ def crossings_of(
     ndarray, shape (k,)
         NaN where a lane does not cross.
     """
-    step = float(s[1] - s[0])
-    out = np.empty(len(light))
-    _cross_lanes(light, (place - s[0]) / step, near / step, inner / step, outer / step,
-                 reach / step, out)  # fmt: skip
-    return np.asarray(s[0] + step * out)
-
-
-@njit(cache=True)
-def _cross_lanes(
-    light: Array, place: float, near: float, inner: float, outer: float, reach: float,
-    out: Array,
-) -> None:  # fmt: skip
-    """Everything in samples."""
+    out = np.full(len(light), np.nan)
+    if np.isnan(place):
+        return out
+    step = s[1] - s[0]
+    place, near, reach = (place - s[0]) / step, near / step, reach / step
     count, columns = light.shape
-    out[:] = np.nan
     for i in range(count):
-        low = _mean(light, i, place - near - inner, place - near)
-        high = _line(light, i, place + near, place + near + outer, place)
+        low = _mean(light, i, place - near - inner / step, place - near)
+        high = _line(light, i, place + near, place + near + outer / step, place)
         if not high > low:
             continue
         level = 0.5 * (low + high)
@@ -436,7 +469,8 @@ def _cross_lanes(
             line = best + 0.5 + (level - 0.25 * (a + b + c + d)) / slope
             if abs(line - best - 0.5) <= 1.0:
                 at = line
-        out[i] = at
+        out[i] = s[0] + step * at
+    return out
 
 
 @njit(cache=True)

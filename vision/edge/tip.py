@@ -7,19 +7,23 @@ past the end, and lanes along it, over the middle of the width, give the line of
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.jit import njit
 from ..curve.curve import Curve
-from ..curve.robust import median, quantile
+from ..curve.robust import _median, _quantile
 from .edges import clear_of
 from .step_line import (
     SPAN,
     STEP_PX,
+    Crossed,
     EndFace,
     crossings_of,
     fit_step,
-    lanes,
+    lanes_along,
     line_through,
 )
 
@@ -82,67 +86,76 @@ def find_tip(
     near = clear_of(blur)
     inner = max(4.0, 0.5 * width)
     outer = max(4.0, SPAN * blur)
+    seen = _crossed(
+        grey, curve, _LANES * width, middle, expected, reach, near, inner, outer,
+        max(4.0, 3.0 * blur), 0.5 * width, math.nan if face is None else face, sign,
+    )  # fmt: skip
+    return fit_step(seen, blur=blur, inner=inner, outer=outer, fine=fine)
+
+
+@njit(cache=True)
+def _crossed(
+    grey: Image, curve: Curve, across: Array, middle: float, expected: float,
+    reach: float, near: float, inner: float, outer: float, level: float, half: float,
+    face: float, sign: float,
+) -> Crossed:  # fmt: skip
+    """Return lanes where they cross the end, seen in a rough look at their mean."""
     s = np.arange(
-        expected - reach - near - inner,
-        expected + reach + near + outer + STEP_PX,
+        expected - reach - near - inner, expected + reach + near + outer + STEP_PX,
         STEP_PX,
-    )
-    across = middle + _LANES * width
-    light = lanes(grey, curve, s, across, sign)
-    place = _rough_end(light[3:-3].mean(axis=0), s, expected, reach, near, inner, face)
-    if place is None:
-        return None
-    crossing = crossings_of(
-        light, s, place, near, inner, max(4.0, 3.0 * blur), reach=0.5 * width
-    )
-    line = line_through(across - middle, crossing)
-    if line is None or not fine:
-        return line
-    return fit_step(
-        light, s, across - middle, line, crossing, blur=blur, inner=inner, outer=outer
-    )
+    )  # fmt: skip
+    light = lanes_along(grey, curve, s, middle + across, sign)
+    inside = light[3:-3]
+    profile = np.sum(inside, axis=0) / len(inside)
+    place = _rough_end(profile, s, expected, reach, near, inner, face)
+    crossing = crossings_of(light, s, place, near, inner, level, half)
+    crossed: Crossed = line_through(light, s, across, crossing)
+    return crossed
 
 
+@njit(cache=True)
 def _rough_end(
     profile: Array, s: Array, expected: float, reach: float, near: float, inner: float,
-    face: float | None,
-) -> float | None:  # fmt: skip
+    face: float,
+) -> float:  # fmt: skip
     """Find where the mean lane leaves the rod: the first time, going outwards.
 
     Between rod and paper may lie the rod's shade, darker than half: then the rod ends
     where the shade begins. So may its end face, but no farther than it is seen; where
-    that is not known, a shade ends less steeply.
+    that is not known, NaN, a shade ends less steeply. NaN where there is no end.
     """
-    rod = median(profile[s < expected - reach - near])
-    paper = quantile(profile[s > expected], 0.75)
+    rod = _median(profile[s < expected - reach - near])
+    paper = _quantile(profile[s > expected], 0.75)
     if not paper > rod:
-        return None
+        return np.nan
     light = (profile - rod) / (paper - rod)
     within = (s >= expected - reach) & (s <= expected + reach)
     hits = np.flatnonzero((light > 0.5) & within)
-    if not hits.size:
-        return None
+    if hits.size == 0:
+        return np.nan
     end = float(s[hits[0]])
     least = _half_way(light[(s < end - near) & (s > end - near - _LEVEL * near)])
     dark = np.flatnonzero((light < least) & (s < end))
     shade = float(s[dark[-1] + 1] if dark.size else s[within][0])
     if light[np.searchsorted(s, shade - near)] > 0.5 * least:
         return end  # paler little by little, as a tail that tapers: no shade
-    if face is None:
+    if np.isnan(face):
         soft = _SOFTER * _rise(light, s, end) < _rise(light, s, shade)
         face = 0.0 if soft else inner
     return shade if end - shade > near + _FACE_SEEN * face else end
 
 
+@njit(cache=True)
 def _half_way(before: Array) -> float:
     """Return half of the level right before an end, if there is one; else `_SHADE`."""
     if len(before) < 2:
         return _SHADE
-    low, level, high = np.quantile(before, [0.1, 0.5, 0.9])
+    low, level, high = np.quantile(before, np.array([0.1, 0.5, 0.9]))
     deep = _DEEPEST < 0.5 * level < _SHADE and high - low < _FLAT * level
     return float(0.5 * level) if deep else _SHADE
 
 
+@njit(cache=True)
 def _rise(light: Array, s: Array, place: float) -> float:
     """Return the steepest rise near a place, per sample."""
-    return float(np.diff(light[np.abs(s - place) <= _STEP_SIDE_PX]).max())
+    return float(np.max(np.diff(light[np.abs(s - place) <= _STEP_SIDE_PX])))

@@ -202,7 +202,7 @@ def _tinted(photo: Photo, refined: Refined) -> bool:
     around = photo.colour((slice(y, y + 2 * half), slice(x, x + 2 * half)))
     if around is None:
         return False
-    near = replace(curve, points=curve.points - np.array([x, y]))
+    near = curve._replace(points=curve.points - np.array([x, y]))
     beside = 0.5 * width + 4.0
     across = np.array([-beside, -0.25 * width, 0.0, 0.25 * width, beside])
     s = curve.s[-1] + clear_of(refined.blur) + np.linspace(0.0, 0.2 * width, 9)

@@ -214,11 +214,11 @@ def refine(
         settled = still and not sought
         if settled:
             break
-    curve = replace(fit.curve, s=fit.curve.s - first)
+    curve = fit.curve._replace(s=fit.curve.s - first)
     white = saturated(seen, sign)
     return Refined(
         fit=replace(fit, curve=curve), shaded=shaded, good=used, width=width,
-        sigma_width=sigma_width, tip=replace(tip, s=tip.s - first),
+        sigma_width=sigma_width, tip=tip._replace(s=tip.s - first),
         clamp=None if lines is None else lines.shifted(first), rough=state.rough,
         blur=state.blur, joints=None if places is None else places - first,
         saturated=white, whole=is_cut_off(grey, seen, sign), settled=settled,

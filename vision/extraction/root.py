@@ -9,7 +9,7 @@ something else (a shade's border, a chamfer), and the place is known no better.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -178,7 +178,7 @@ def _hidden_root(refined: Refined, ends: LocalView, setting: Setting) -> float:
         line = None if seen is None else seen.front or seen.face
         if line is None:
             return 0.0
-        return _below(refined, replace(line, s=0.0), setting.clamp_height_mm, setting)
+        return _below(refined, line._replace(s=0.0), setting.clamp_height_mm, setting)
     if setting.length_mm is None:
         return 0.0
     missing = setting.length_mm * along - refined.tip.s
