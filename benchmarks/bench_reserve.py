@@ -79,7 +79,7 @@ class Row:
 def measured(case: Case) -> Row:
     found = extract(
         case.photo, case.camera, rod_height_mm=case.height_mm,
-        clamp_height_mm=case.scene.clamp.height_mm,
+        clamp_height_mm=case.scene.clamp.height_mm, is_round=False,
     )  # fmt: skip
     if not found.ok or found.pose is None:
         return Row(case=case, found=found)

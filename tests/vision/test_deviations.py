@@ -32,8 +32,9 @@ SCENE = Scene(
 def measured(scene, camera=CAMERA):
     picture = render_scene(scene, camera, np.random.default_rng(3))
     found = extract(
-        as_photo(picture), camera, rod_height_mm=HEIGHT, clamp_height_mm=4.0
-    )
+        as_photo(picture), camera, rod_height_mm=HEIGHT, clamp_height_mm=4.0,
+        is_round=False,
+    )  # fmt: skip
     assert found.ok, found.reason
     return found
 

@@ -88,6 +88,22 @@ def test_lane_with_a_speck_at_the_end_counts_for_nothing():
     assert fitted(light).s == pytest.approx(0.0, abs=0.01)
 
 
+@pytest.mark.parametrize("shade", [0.05, 0.1, 0.2])
+def test_a_front_in_shade_that_is_not_straight_is_as_unsure_as_it_is_off(shade):
+    light = lanes_over(0.0, 0.0)
+    foot = light - shade * (light - LOW) * np.exp(-np.maximum(S, 0.0) / 3.0)
+    found, clean = (
+        fit_step(
+            line_through(seen, S, ACROSS, np.zeros(len(ACROSS))),
+            blur=BLUR, inner=4.0, outer=6.0, own=True,
+        )
+        for seen in (foot, light)
+    )  # fmt: skip
+    assert clean.s == pytest.approx(0.0, abs=0.003)
+    assert clean.place_sd < 0.01
+    assert 0.01 < abs(found.s) < 2.5 * found.place_sd
+
+
 def test_lines_at_the_clamp_weigh_as_their_steps_squared_and_as_they_are_seen():
     """The front is seen over three widths of the rod, the face over 0.6."""
     alike = ClampLines(face=LINE._replace(rise=0.2), front=LINE._replace(rise=0.2))

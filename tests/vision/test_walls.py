@@ -119,7 +119,7 @@ def test_edges_are_of_use_where_no_wall_is_seen_on_a_bent_rod():
     found = edges.Edges(
         low=-0.5 * width, high=0.5 * width, slope_low=level, slope_high=level,
         inner=0.0 * level, outer_low=level, outer_high=level, shade_low=0.0 * level,
-        shade_high=0.0 * level,
+        shade_high=0.0 * level, growth=0.0 * level,
     )  # fmt: skip
     assert not found.usable().all()
     assert found.usable(width - 27.0).all()

@@ -41,6 +41,10 @@ _CLAMP_SPAN = 3.0
 """So many blurs of the clamp are fitted: its foot and the corner over the rod are dark,
 and only what lies right beside the line makes the step."""
 
+_ALIKE = 1.9
+"""Standard deviation of the face's place over what its lanes scatter, were they
+independent: they lie close together on the rod, and share their levels."""
+
 _LEAST_PX = 0.8
 """Blur for which a lane's own levels are sought at least: fewer samples do not tell."""
 
@@ -132,7 +136,8 @@ def find_clamp(
         blur=blur, inner=SPAN * blur, outer=_CLAMP_SPAN * blur, fine=fine,
     )  # fmt: skip
     if face is not None:
-        face = face._replace(s=-face.s, skew=-face.skew)
+        sigma = _ALIKE * face.sigma
+        face = face._replace(s=-face.s, skew=-face.skew, sigma=sigma)
     front = fit_step(
         _front(
             grey, curve, expected, span, (_BESIDE if fine else _BESIDE[::2]) * width,

@@ -52,6 +52,9 @@ class Edges:
         Level of the rod and of the paper at either edge.
     shade_low, shade_high : ndarray, shape (n,)
         Slope of the paper's level beside the edge, per px outwards.
+    growth : ndarray, shape (n,)
+        How much farther out edges are with levels clear of the blur than with closer
+        ones, px, where the paper has no shade.
     """
 
     low: Array
@@ -63,6 +66,7 @@ class Edges:
     outer_high: Array
     shade_low: Array
     shade_high: Array
+    growth: Array
 
     @property
     def middle(self) -> Array:
@@ -180,7 +184,7 @@ def find_edges(
     return Edges(
         low=-out[0, 0], high=out[1, 0], slope_low=out[0, 1], slope_high=out[1, 1],
         inner=0.5 * (out[0, 2] + out[1, 2]), outer_low=out[0, 3], outer_high=out[1, 3],
-        shade_low=out[0, 4], shade_high=out[1, 4],
+        shade_low=out[0, 4], shade_high=out[1, 4], growth=growth,
     )  # fmt: skip
 
 

@@ -26,9 +26,9 @@ STEP_PX = 0.5
 SPAN = 5.5
 """So many blurs of paper are fitted: fewer leave its slope in doubt, and shade is
 straight no farther."""
-LINE_SIGMA, LINE_BLUR = 1.9, 0.025
-"""Standard deviation of a place that a line tells: of what its crossings scatter, were
-they independent, and of its blur."""
+UNEVEN, _FARTHER = 3.0, 1.5
+"""Standard deviation of a place over how far it moves with so much more of the paper
+before it, by shade that is not straight: there is more such shade nearer by."""
 _SHARPER, _SOFTER = 0.7, 2.5
 """By how much an end may be sharper, or softer, than was expected."""
 _ROUNDS, _ROUNDS_OWN = 3, 4
@@ -57,6 +57,9 @@ class EndFace(NamedTuple):
     rise, blur : float
         Light behind the line minus light before it, and standard deviation of the blur
         along the rod, px, of the step that was fitted; 0 where none was.
+    uneven : float
+        How far it moves with more of the paper before it, px; 0 where its lanes have
+        no levels of their own.
     """
 
     s: float
@@ -67,11 +70,12 @@ class EndFace(NamedTuple):
     rise: float = 0.0
     blur: float = 0.0
     skew_sd: float = 0.0
+    uneven: float = 0.0
 
     @property
     def place_sd(self) -> float:
         """Standard deviation of the place, px: shade moves neighbouring lanes alike."""
-        return math.hypot(LINE_SIGMA * self.sigma, LINE_BLUR * self.blur)
+        return math.hypot(self.sigma, UNEVEN * self.uneven)
 
 
 class Crossed(NamedTuple):
@@ -97,7 +101,7 @@ class Crossed(NamedTuple):
     line: EndFace
 
 
-NOT_SEEN = EndFace(np.nan, np.nan, np.nan, np.nan, 0.0, 0.0, 0.0, np.nan)
+NOT_SEEN = EndFace(np.nan, np.nan, np.nan, np.nan, 0.0, 0.0, 0.0, np.nan, 0.0)
 
 
 def lanes(
@@ -222,7 +226,7 @@ def _fitted(
     line, s = seen.line, seen.s
     wide = np.hypot(blur, line.scatter)
     light, across = _near(seen)
-    place, skew, fitted, rise, known, off = _fit_step(
+    place, skew, fitted, rise, known, off, uneven = _fit_step(
         light, s, across, line.s, line.skew, wide, inner, outer, own
     )
     if not (abs(place - line.s) < 2.0 * wide and np.any(known != 0.0)):
@@ -236,7 +240,9 @@ def _fitted(
         alone = scatter * np.sqrt(_ALIKE * np.sum(share**2)) + 0.005
         sigma, skew_sd = alone * np.hypot(1.0, middle / spread), alone / spread
     height = np.sum(share * rise)
-    found = EndFace(place, sigma, skew, scatter, line.found, height, fitted, skew_sd)
+    found = EndFace(
+        place, sigma, skew, scatter, line.found, height, fitted, skew_sd, uneven
+    )
     white = 0.0
     for sign in (1.0, -1.0):
         if WHITE < np.nanmax(sign * light) <= HELD:
@@ -279,30 +285,24 @@ def _to_whole_step(
 def _fit_step(
     light: Array, s: Array, across: Array, place: float, skew: float, blur: float,
     inner: float, outer: float, own: bool,
-) -> tuple[float, float, float, Array, Array, Array]:  # fmt: skip
+) -> tuple[float, float, float, Array, Array, Array, float]:  # fmt: skip
     """Gauss-Newton for place and skew of a line and the blur, each group's levels out.
 
     A group is a lane with levels of its `own`, else all lanes. Returns the three, and
     of each group the step's height, how surely it tells the place, and by how much it
-    tells another one.
+    tells another one; last, how far the line moves with more of the outer level.
     """
     groups = len(light) if own else 1
     least, most = _SHARPER * blur, _SOFTER * blur
     weight, known, off = np.ones(groups), np.zeros(groups), np.zeros(groups)
     equations, heights = np.zeros((groups, 3, 4)), np.zeros((groups, 4))
-    step = np.zeros(3)
+    step, uneven = np.zeros(3), 0.0
     for _ in range(_ROUNDS_OWN if own else _ROUNDS):
         _fill(light, s, across, place, skew, blur, inner, outer, equations, heights)
         rise: Array = heights[:, 3].copy()
         for _again in range(2):  # the step changes the levels
-            total = np.zeros((3, 4))
-            for g in range(groups):
-                scale = weight[g] * rise[g]
-                total[:, :3] += scale * rise[g] * equations[g, :, :3]
-                total[:, 3] += scale * equations[g, :, 3]
-            if not np.linalg.det(total[:, :3]) > 0.0:
-                return place, skew, blur, rise, np.zeros(groups), off
-            step[:] = np.linalg.solve(total[:, :3].copy(), total[:, 3].copy())
+            if not _solve(equations, weight, rise, step):
+                return place, skew, blur, rise, np.zeros(groups), off, uneven
             rise = heights[:, 3] - rise * (heights[:, :3].copy() @ step)
         place, skew = place + step[0], skew + step[1]
         blur = min(max(blur + step[2], least), most)
@@ -314,7 +314,26 @@ def _fit_step(
             usual = np.median(pull) + _LEAST_OFF * np.sqrt(np.max(known))
             weight = 1.0 / (1.0 + (pull / (_OUTLYING * usual)) ** 2)
             off, weight = np.where(known > 0.0, off, 0.0), weight * (known > 0.0)
-    return place, skew, blur, rise, known, off
+    if own:
+        farther = _FARTHER * outer
+        _fill(light, s, across, place, skew, blur, inner, farther, equations, heights)
+        if _solve(equations, weight, rise, step):
+            uneven = abs(step[0])
+    return place, skew, blur, rise, known, off, uneven
+
+
+@njit(cache=True)
+def _solve(equations: Array, weight: Array, rise: Array, step: Array) -> bool:
+    """Fill in the step that all groups together ask for; False where none does."""
+    total = np.zeros((3, 4))
+    for g in range(weight.size):
+        scale = weight[g] * rise[g]
+        total[:, :3] += scale * rise[g] * equations[g, :, :3]
+        total[:, 3] += scale * equations[g, :, 3]
+    if not np.linalg.det(total[:, :3]) > 0.0:
+        return False
+    step[:] = np.linalg.solve(total[:, :3].copy(), total[:, 3].copy())
+    return True
 
 
 @njit(cache=True)
@@ -386,7 +405,9 @@ def line_through(light: Array, s: Array, across: Array, crossing: Array) -> Cros
     if found > 0 and found >= 0.5 * crossing.size:
         place, slope, scatter, used, spread = _fit_line(across, crossing)
         sigma, part = scatter / np.sqrt(used) + 0.005, found / crossing.size
-        line = EndFace(place, sigma, slope, scatter, part, 0.0, 0.0, sigma / spread)
+        line = EndFace(
+            place, sigma, slope, scatter, part, 0.0, 0.0, sigma / spread, 0.0
+        )
     return Crossed(light, s, across, crossing, line)
 
 

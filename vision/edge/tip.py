@@ -42,6 +42,9 @@ _STEP_SIDE_PX, _SOFTER, _FACE_SEEN = 2.0, 1.8, 1.3
 """How far about a place its slope is looked for; how much less steep a shade ends than
 its rod; and how much more of an end face may be seen than its width tells."""
 _LANES = np.linspace(-0.5, 0.5, 13) * _SHARE
+ROUND_END = float(np.sqrt(1.0 - (2.0 * _LANES) ** 2).mean())
+"""How far the lanes of a round rod end beyond its axis, over what those of a square one
+do, where its end is seen aslant."""
 
 
 def find_tip(

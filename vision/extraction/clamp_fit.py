@@ -19,7 +19,7 @@ from ..camera.calibration import Calibration
 from ..edge.step_line import EndFace
 from ..edge.wall_light import WALL_PLACES
 from ..find.ground import View
-from .deviations import is_dark, white_px
+from .deviations import EDGE_MM, is_dark, white_px
 from .refine import Refined
 from .setting import Setting
 from .told_clamp import ToldClamp, surer_direction
@@ -99,7 +99,8 @@ def fit_clamp(
     turn, turn_sd = _front(refined, setting, camera, heading)
     # y runs down in the picture: there the heading turns the other way.
     bend = -float(np.interp(root.s, curve.s, curve.kappa))
-    place_sd = math.hypot(root.sd, white_px(refined))
+    edge = EDGE_MM * float(view.along[0])
+    place_sd = math.hypot(root.sd, white_px(refined), edge)
     shift, covariance, apart = joint(place_sd, rod_sd, bend, turn, turn_sd)
     own_sd_deg = math.degrees(math.sqrt(covariance[1, 1]))
     angle_deg, sd_deg, flags = surer_direction(

@@ -87,6 +87,10 @@ class Refined:
         Arc lengths of its joints; None where none were sought.
     whole : bool
         Whether edges that are cut off there were moved to half of all the light.
+    walled : float
+        By how far the light on its side walls had moved the midline, px.
+    growth : float
+        How much farther out its edges are with levels that lie farther from them, px.
     settled : bool
         Whether the last pass still moved nothing.
     """
@@ -103,6 +107,8 @@ class Refined:
     saturated: float
     joints: Array | None = None
     whole: bool = False
+    walled: float = 0.0
+    growth: float = 0.0
     settled: bool = True
 
     @property
@@ -175,12 +181,14 @@ def refine(
     if not np.isfinite(sd_px):
         tip, lines, first = find_ends(grey, state, seen, root, sign, 0, walls)
         end, still_px = tip.s, _STILL_PX
-    places, aside, settled = None, np.inf, False
+    places, aside, walled, settled = None, np.inf, 0.0, False
     for turn in range(_PASSES):
         if turn:
             seen = _look(grey, state, sign, turn, seeking=seeking)
         if walls is not None:
+            half_way = seen.edges.middle
             seen = to_wall_ends(state, seen, walls)
+            walled = median(np.abs(seen.edges.middle - half_way))
         if not seeking and is_cut_off(grey, seen, sign):
             seen = to_whole_edges(grey, state, seen, walls, sign, anew=aside > _KEPT_PX)
         if not (seeking or state.rough):
@@ -221,7 +229,8 @@ def refine(
         sigma_width=sigma_width, tip=tip._replace(s=tip.s - first),
         clamp=None if lines is None else lines.shifted(first), rough=state.rough,
         blur=state.blur, joints=None if places is None else places - first,
-        saturated=white, whole=is_cut_off(grey, seen, sign), settled=settled,
+        saturated=white, whole=is_cut_off(grey, seen, sign), walled=walled,
+        growth=abs(median(seen.edges.growth[seen.good])), settled=settled,
     )  # fmt: skip
 
 

@@ -61,7 +61,7 @@ class RootPlace:
 
 
 def root_place(
-    refined: Refined, ends: LocalView, setting: Setting, height_mm: float
+    refined: Refined, ends: LocalView, setting: Setting, rim_mm: float
 ) -> RootPlace:
     """Return where the axis leaves the clamp, on the fitted curve.
 
@@ -73,8 +73,8 @@ def root_place(
         How the camera sees its ends, the root first.
     setting : Setting
         What is known.
-    height_mm : float
-        Height of its section.
+    rim_mm : float
+        How high above its axis its upper rim is, in the middle.
     """
     if refined.clamp is None:
         return RootPlace(s=0.0, sd=BORDER_PX)
@@ -88,7 +88,7 @@ def root_place(
         return RootPlace(s=place, sd=sd, hidden=hidden)
     seen_at, axis_mm = [], setting.axis_height_mm
     if face is not None:
-        seen_at.append(_below(refined, face, axis_mm + 0.5 * height_mm, setting))
+        seen_at.append(_below(refined, face, axis_mm + rim_mm, setting))
     if front is not None:
         seen_at.append(_below(refined, front, 0.0, setting))
     if not seen_at:

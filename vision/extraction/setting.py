@@ -46,9 +46,10 @@ class Setting:
         How well that is known: then a length is off that differs by three deviations.
     side_mm : float or None
         Nominal side of its section: tells the rod from other long thin things.
-    is_round : bool
+    is_round : bool or None
         Whether its section is a circle: it is seen no wider than it is, from whatever
-        side, and has no walls.
+        side, and has no walls. None where it is not told: the rod is taken for square
+        then, and the deviations include that it may be round, or flat.
     height_share : float
         Height of its section over the side that the camera sees.
     colour : str or None
@@ -76,7 +77,7 @@ class Setting:
     length_mm: float | None = None
     length_sd_mm: float | None = None
     side_mm: float | None = None
-    is_round: bool = False
+    is_round: bool | None = None
     height_share: float = 1.0
     colour: str | None = None
     clamp: Clamp = "auto"

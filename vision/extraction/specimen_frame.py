@@ -20,10 +20,11 @@ from ..camera.calibration import Calibration
 from ..camera.find_tag import TaggedClamp
 from ..curve.robust import median
 from ..edge.state import LostError
+from ..edge.tip import ROUND_END
 from ..find.ground import View
 from ..measurement import Measurement, Pose
 from .clamp_fit import ClampFit, fit_clamp
-from .deviations import is_dark, side_face, with_deviations
+from .deviations import faces_px, is_dark, with_deviations
 from .refine import Refined
 from .root import root_place
 from .setting import Setting, arc_mm
@@ -106,9 +107,11 @@ def _calibrated(
     curve = refined.fit.curve
     ends = setting.view(camera, curve.points[[0, -1]], curve.theta[[0, -1]])
     side_mm = refined.typical_width / float(setting.silhouette(ends).mean())
-    height_mm = setting.height_share * side_mm
-    last = refined.tip.s - 0.5 * height_mm * abs(float(ends.rise_along[1]))
-    seen = root_place(refined, ends, setting, height_mm)
+    rim_mm = 0.5 * setting.height_share * side_mm
+    if setting.is_round:
+        rim_mm *= ROUND_END
+    last = refined.tip.s - rim_mm * abs(float(ends.rise_along[1]))
+    seen = root_place(refined, ends, setting, rim_mm)
     told = told_clamp(seen, tag, refined, setting, camera)
     clamp = fit_clamp(told, refined, seen_in, setting, camera)
     s = np.linspace(clamp.s, last, 4 * POINTS)
@@ -145,8 +148,8 @@ def _in_frame(
     kappa = np.gradient(heading + theta, s_mm[1])
     kappa -= np.interp(s, grid.s, grid.kappa) * view.along
     table = _pixel_columns(refined, s, points, theta)
-    doubt = side_face(seen_in) * np.abs(wall)
-    table["sigma_px"] = np.hypot(table["sigma_px"], doubt)
+    faces = faces_px(refined, wall, seen_in, told=setting.is_round is not None)
+    table["sigma_px"] = np.hypot(table["sigma_px"], faces)
     table |= {
         "s_mm": s_mm,
         "x_mm": own[:, 0],
@@ -174,13 +177,7 @@ def _in_frame(
         pose=pose,
         flags=clamp.flags,
     )
-    height_mm = setting.axis_height_mm
     return with_deviations(
-        result,
-        refined,
-        clamp.covariance,
-        view,
-        camera,
-        height_mm,
+        result, refined, clamp.covariance, view, camera, setting, faces,
         dark=is_dark(seen_in),
-    )
+    )  # fmt: skip
