@@ -65,7 +65,7 @@ def test_direction_that_leaves_the_tip_unsure_is_doubted():
 
 @pytest.mark.parametrize(
     ("camera_height_mm", "rod_height_mm", "doubtful"),
-    [(None, 0.0, False), (None, 0.9, True), (330.0, 0.9, False), (60.0, 2.0, True)],
+    [(None, 0.0, False), (None, 0.9, True), (330.0, 6.0, False), (45.0, 2.0, True)],
 )
 def test_height_that_cannot_be_corrected_is_doubted(
     camera_height_mm, rod_height_mm, doubtful

@@ -89,10 +89,21 @@ def test_what_is_no_copy_of_a_rod_is_not_taken_for_it():
     assert seen(photo)[1].mix is None
 
 
-def test_where_colours_are_coarse_a_dark_rod_is_seen_by_its_lightness():
-    deep = {"kept": (0.4, 0.4, 0.4), "aside": 14.0}
-    assert not seen(drawn(RED, **deep))[1].plain
-    assert seen(drawn(RED, coarse=True, **deep))[1].mix == LUMINANCE
+@pytest.mark.parametrize(("kept", "plain"), [(0.4, False), (0.7, True)])
+def test_colour_is_asked_only_where_half_level_may_be_the_shade_s(kept, plain):
+    """A red rod keeps 0.25 of the paper's light: half way to paper is 0.62."""
+    photo = drawn(RED, kept=(kept,) * 3, aside=14.0, coarse=True)
+    assert seen(photo)[1].plain is plain
+
+
+def test_it_is_the_paper_beside_the_rod_that_has_no_colour():
+    """A black rod on a yellow sheet, which is a small part of a grey picture."""
+    photo = drawn(BLACK, kept=(0.4,) * 3, aside=14.0)
+    assert seen(photo, 0.0)[1].mix is None
+    desk = np.full((600, 1200, 3), 150, np.uint8)
+    code = cv2.multiply(photo.decode(), (0.6, 1.0, 1.0, 0.0))
+    desk[:200, :400] = code
+    assert seen(as_photo(desk))[1].mix is None
 
 
 def told(photo, things):

@@ -36,8 +36,8 @@ SIDE_TOLERANCE = 0.08
 TURN_MM = 0.15
 """What the standard deviation of the direction at the clamp may do to the tip."""
 
-SCALE = 5e-4
-"""Doubt of the scale, for want of the camera's height, above which it is named."""
+SCALE_MM = 0.05
+"""What that of the scale may, for want of the camera's height: all frames share it."""
 
 CLAMP_DOUBTFUL = "clamp_doubtful"
 TIP_GOES_ON, OTHER_ROD, OTHER_COLOUR = "tip_goes_on", "other_rod", "colour_mismatch"
@@ -144,10 +144,10 @@ def doubts(
     setting: Setting,
 ) -> Measurement:
     """Return the measurement with its flags, beside those of what lies around it."""
-    flags = list(result.flags)
-    if setting.calibration is None:
+    flags, camera = list(result.flags), setting.calibration
+    if camera is None:
         flags.append("uncalibrated")
-    elif scale_sd(setting.calibration, setting.axis_height_mm) > SCALE:
+    elif scale_sd(camera, setting.axis_height_mm) * result.length_mm > SCALE_MM:
         flags.append("height_doubtful")
     if _height_is_assumed(setting):
         flags.append("height_assumed")

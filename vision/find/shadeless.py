@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,6 +42,12 @@ _COLOURED, _CLEAR, _LIGHT = 0.05, 8.0, 1.6
 and over the noise of one pixel; and light of a rod, over the paper's, that tells it
 from any shade."""
 
+_PAPER = 0.75
+"""Part of what lies beside a rod that is no lighter than the paper: rod and shade."""
+
+_UNEVEN = 0.1
+"""How much a rod may vary in a mix of colours, in which it is 0.65 from the paper."""
+
 _ALL_ALONG = 0.6
 """Part of the stations at which something coloured is seen."""
 
@@ -58,17 +63,9 @@ the rod's, or the rod's over that, at least."""
 _PALER = 0.04
 """How much paler than a rod without colour, of the paper's light, its shade is."""
 
-_MISSING, _MISSING_PX, _UNEVEN = 0.03, 0.7, 0.06
-"""Light of the paper that is missing beside a rod where it has a shade: as that of so
-many widths of bare paper, and of so many px; what is less of a pixel's is uneven light.
-"""
-
-_DARKER, _AS_SHARP = 0.5, 0.92
-"""Light of a rod over that in its shade by which lightness tells them too; and how
-sharp its colour must be then, over that."""
-
-_ALIKE = 9
-"""Stations that see about the same of a shade."""
+_CLOSE, _MOST = (0.55, 1.5), 0.2
+"""Where a shade is seen right beside its rod, in widths from the axis; and the part
+of the stations at which it may seem darker than it is: a clamp's is there, too."""
 
 _NOISE, _DEPTH = 0.003, 0.1
 """Least noise of the light of a pixel; and what a shade takes of it."""
@@ -93,12 +90,12 @@ def in_its_colour(photo: Photo, rod: Candidate, view: View) -> tuple[Candidate, 
     view : View
         Without a shade it is the lightness that the colours have together.
     """
-    paper = _paper_colour(photo)
-    if paper is None:
+    if photo.colour_at(rod.points_px[:1]) is None:
         return rod, view
     points, normals, across = _lanes(rod)
     spots = points[:, None] + across[:, None] * normals[:, None]
     glance = np.asarray(photo.colour_at(spots[::_FEW, ::2]))
+    paper = np.quantile(glance, _PAPER, axis=(0, 1)).astype(float)
     if not _tinted(glance / paper).any():
         return rod, view  # as most rods, at little cost
     light = np.asarray(photo.colour_at(spots))
@@ -111,17 +108,22 @@ def in_its_colour(photo: Photo, rod: Candidate, view: View) -> tuple[Candidate, 
     middle = np.interp(np.arange(len(points)), seen, band[seen].mean(axis=1))
     width = median(np.ptp(band[seen], axis=1))
     brightness = share.mean(axis=2)
-    if not _is_its_shade(brightness, middle, normals, width, across):
+    within = float(np.mean(np.abs(middle) < 0.5 * width)) > _ALL_ALONG
+    if not within and not _is_its_shade(brightness, middle, width, normals, across):
         return rod, view
-    if _missing_px(brightness, tint) < max(_MISSING * width, _MISSING_PX):
+    away = np.abs(across - middle[:, None]) / width
+    beside = (away > _CLOSE[0]) & (away < _CLOSE[1])
+    whole = within and _AS_WIDE < width / rod.width_px < 1.0 / _AS_WIDE
+    if whole and _is_pale(brightness, tint, beside):
         return rod, in_lightness(photo, rod, view)
+    mix = _discriminant(light, tint, paper)
+    if np.std(light[tint > 0.8] @ mix) > _UNEVEN:
+        return rod, view
     near = _near(rod)
     along = slice(seen[0], seen[-1] + 1)
     axis = (points + middle[:, None] * normals)[along]
     rod = replace(rod, points_px=axis, width_px=width)
-    if _is_coarse(brightness, tint, middle, width):
-        return rod, mixed(photo, LUMINANCE, 1.0, near)
-    return rod, mixed(photo, _discriminant(light, tint, paper), 1.0, near)
+    return rod, mixed(photo, mix, 1.0, near)
 
 
 def in_lightness(photo: Photo, rod: Candidate | None, view: View) -> View:
@@ -226,15 +228,13 @@ def _nearest_band(on: Mask, across: Array) -> Array:
 
 
 def _is_its_shade(
-    share: Array, middle: Array, normals: Array, width: float, across: Array
+    share: Array, middle: Array, width: float, normals: Array, across: Array
 ) -> bool:
-    """Whether what lies along an axis is part of a rod beside it, or may be its shade.
+    """Whether what lies along an axis may be the shade of a rod beside it.
 
     A shade is the rod once more, shifted by one vector.
     """
-    inside: Mask = np.abs(middle) < 0.5 * width
-    if inside.mean() > _ALL_ALONG:
-        return True
+    inside = np.abs(middle) < 0.5 * width
     axis = share[:, len(across) // 2]
     ridge = len(normals) * _SHIFT**2 * np.eye(2)
     shift = np.linalg.solve(normals.T @ normals + ridge, normals.T @ middle)
@@ -259,40 +259,15 @@ def _tinted(share: Array) -> Array:
     return np.asarray(hue @ direction / np.median(hue[strong] @ direction))
 
 
-def _missing_px(share: Array, tint: Array) -> float:
-    """Return how much of the paper's light is missing beside a rod, px of bare paper.
+def _is_pale(share: Array, tint: Array, beside: Mask) -> bool:
+    """Whether a shade right beside its rod is lighter than half way from that to paper.
 
-    Blur mixes the light of rod and paper, and so their tints; a shade has none.
+    Half level is then the rod's own edge, which colours would tell less well: most
+    sensors guess two of three at a pixel, JPEG keeps every other pixel's, and a mix of
+    them has several times their noise.
     """
-    paper = np.quantile(share, 0.85, axis=1, keepdims=True)
-    rod = median((share / paper)[tint > 0.8])
-    missing = cv2.blur(1.0 - (1.0 - rod) * tint - share / paper, (1, _ALIKE))
-    shaded = (missing > _UNEVEN) & (tint < 0.5)
-    return float(np.quantile(np.sum(missing * shaded, axis=1), 0.7))
-
-
-def _is_coarse(share: Array, tint: Array, middle: Array, width: float) -> bool:
-    """Whether colours are less sharp than lightness, which tells the rod as well.
-
-    JPEG keeps every other pixel's colour; those of most sensors are guessed from their
-    neighbours'. In one light, blurred alike, both change by the same share per pixel.
-    """
-    rod = median(share[tint > 0.8])
-    if rod > _DARKER * np.quantile(share[np.abs(tint) < 0.2], 0.1):
-        return False
-    lane = np.arange(-width, width) + 0.5 * share.shape[1]
-    sharp, hue = (
-        np.abs(np.diff(_typical(part, lane + middle[:, None]))).max()
-        for part in (share / (1.0 - rod), tint)
-    )
-    return bool(hue < _AS_SHARP * sharp)
-
-
-def _typical(part: Array, lane: Array) -> Array:
-    """Return the median of profiles, each from a lane of its own on."""
-    own = np.arange(part.shape[1])
-    rows = [np.interp(at, own, row) for at, row in zip(lane, part, strict=True)]
-    return np.asarray(np.median(rows, axis=0))
+    shade = np.where(beside & (np.abs(tint) < 0.2), share, 1.0).min(axis=1)
+    return bool(np.quantile(shade, _MOST) > 0.5 * (1.0 + median(share[tint > 0.8])))
 
 
 def _discriminant(light: Array, tint: Array, paper: Array) -> Mix:
