@@ -8,7 +8,6 @@ sides of a slit in it are one.
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 
@@ -110,10 +109,7 @@ def level_sets(piece: Mask, seeds: Places | None, half: float) -> LevelSets | No
 
 def _thinned(places: Places, every: int, width: int) -> Places:
     """Return where places are among every so many rows and columns, as flat indices."""
-    if every > 1:  # those on both sides
-        shifts = itertools.product((0, every - 1), repeat=2)
-        places = np.vstack([(places + shift) // every for shift in shifts])
-    row, column = places.T
+    row, column = ((places + every // 2) // every).T
     return np.asarray(row * width + column)
 
 
