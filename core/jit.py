@@ -14,6 +14,7 @@ import os
 import threading
 import warnings
 from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from contextvars import ContextVar
 from pathlib import Path
 from types import CodeType
@@ -79,6 +80,7 @@ class Kernel:
         if self._options.get("cache"):
             file = compiled._cache._cache_file
             file._source_stamp = (file._source_stamp, self.fingerprint)
+            compiled.compile = _one_at_a_time(compiled)
         return compiled
 
     @functools.cached_property
@@ -146,6 +148,28 @@ class Kernel:
         except (ArithmeticError, ValueError):
             # 1 / 0 and sqrt(-1) are numbers to machine code.
             raise _Unfit from None
+
+
+def _one_at_a_time(compiled: Any) -> Callable[[Any], Any]:
+    """Return a dispatcher's `compile` that lets one process compile what others load.
+
+    Processes that start together would each compile the same, and write over what the
+    others noted in the kernel's index.
+    """
+    from numba.core.compiler_lock import global_compiler_lock
+
+    compile_, file = compiled.compile, f"{compiled._cache._cache_file._index_path}.lock"
+
+    def compile_in_turn(signature: Any) -> Any:
+        with global_compiler_lock, ExitStack() as held:
+            if not compiled._compiling_counter:
+                with suppress(ImportError, OSError):  # a system or disk without locks
+                    from fcntl import LOCK_EX, flock
+
+                    flock(held.enter_context(Path(file).open("w")), LOCK_EX)
+            return compile_(signature)
+
+    return compile_in_turn
 
 
 def _codes(code: CodeType) -> list[CodeType]:

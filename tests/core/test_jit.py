@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import warnings
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -144,6 +145,34 @@ def test_stored_code_is_not_used_once_a_kernel_it_holds_has_changed(
     assert run(2.0) == "False 3.0"
     assert run(2.0) == "True 3.0"
     assert run(5.0) == "False 6.0"
+
+
+WAITING = """
+from outer import outer
+
+outer.compiled
+print("asks", flush=True)
+outer(1.0)
+(misses,) = outer.compiled.stats.cache_misses.values() or (0,)
+print("compiled" if misses else "loaded")
+"""
+
+
+def test_of_processes_that_start_together_one_compiles(tmp_path: Path) -> None:
+    (tmp_path / "inner.py").write_text(INNER.format(factor=2.0))
+    (tmp_path / "outer.py").write_text(OUTER.partition("stored")[0])
+    (tmp_path / "waiting.py").write_text(WAITING)
+    command = [sys.executable, "-B", tmp_path / "waiting.py"]
+    said = []
+    with ExitStack() as stack:
+        both = [
+            stack.enter_context(
+                subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+            )
+            for _ in range(2)
+        ]
+        said = sorted(one.communicate(timeout=120)[0].split()[-1] for one in both)
+    assert said == ["compiled", "loaded"]
 
 
 NOWHERE = """
