@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -31,3 +33,36 @@ def system_temp(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     with tempfile.TemporaryDirectory(prefix="mb-") as folder:
         monkeypatch.setattr("magbend.rig.control.names._SYSTEM_TEMP", Path(folder))
         yield Path(folder)
+
+
+class Done(NamedTuple):
+    """What a command left behind; the names are those of `subprocess`."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+@pytest.fixture
+def magbend(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., Done]:
+    """Return what runs a command in this process, in a folder if one is named.
+
+    A process of its own would import everything again, for a second or more.
+    """
+    from magbend.cli.main import main
+
+    def run(*words: object, cwd: Path | None = None) -> Done:
+        monkeypatch.setattr(sys, "argv", ["magbend", *map(str, words)])
+        code = 0
+        with contextlib.chdir(cwd or "."):
+            try:
+                main()
+            except SystemExit as stop:
+                code = int(stop.code or 0)
+        out, messages = capsys.readouterr()
+        assert "Traceback" not in messages
+        return Done(code, out, messages)
+
+    return run

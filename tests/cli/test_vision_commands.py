@@ -12,7 +12,6 @@ import cv2
 import numpy as np
 import pytest
 
-from magbend.cli import main as cli
 from magbend.vision import read_calibration, write_calibration
 from magbend.vision.batch.tables import read_centrelines, read_frames, to_centreline
 from magbend.vision.synthetic.scoring import signed_distance
@@ -20,24 +19,6 @@ from magbend.vision.synthetic.scoring import signed_distance
 FIXTURES = Path(__file__).parents[2] / "fixtures" / "vision"
 RENDERED = FIXTURES / "rendered"
 BOARD = RENDERED / "calib_D.jpg"
-
-
-@pytest.fixture
-def magbend(monkeypatch, capsys):
-    """Run the command in this process; return exit code, output and messages."""
-
-    def run(*words: object) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["magbend", *map(str, words)])
-        try:
-            cli.main()
-            code = 0
-        except SystemExit as stop:
-            code = int(stop.code or 0)
-        out, messages = capsys.readouterr()
-        assert "Traceback" not in messages
-        return code, out, messages
-
-    return run
 
 
 @pytest.fixture(scope="module")
@@ -213,22 +194,6 @@ def test_calibration_of_another_camera_is_named(magbend, tmp_path, calibration):
     assert "1600 x 1200" in messages
     (row,) = read_frames(tmp_path / "frames.csv")
     assert "calibration_mismatch" in row.flags
-
-
-def test_help_names_an_example_and_loads_nothing_heavy():
-    program = (
-        "import sys; sys.argv = ['magbend', 'vision', 'extract', '--help']\n"
-        "from magbend.cli.main import main\n"
-        "try:\n    main()\nexcept SystemExit:\n    pass\n"
-        "heavy = {'numpy', 'scipy', 'cv2', 'numba', 'pandas', 'matplotlib', 'rich'}"
-        " & set(sys.modules)\n"
-        "assert not heavy, heavy\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    assert "Example: magbend vision extract" in done.stdout
 
 
 def test_decoders_of_damaged_files_keep_quiet(calibration, tmp_path):

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import doctest
-import os
 import re
-import subprocess
-import sys
+import shlex
 from pathlib import Path
 
 import pytest
@@ -26,37 +24,23 @@ def transcript(page: Path) -> list[tuple[str, str]]:
     return pairs
 
 
-def run(command: str, folder: Path) -> str:
-    binaries = Path(sys.executable).parent
-    environment = {**os.environ, "PATH": f"{binaries}{os.pathsep}{os.environ['PATH']}"}
-    environment["COLUMNS"] = "100"
-    done = subprocess.run(
-        command,
-        shell=True,
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, f"$ {command}\n{done.stdout}{done.stderr}"
-    return done.stdout
-
-
-@pytest.mark.skipif(os.name != "posix", reason="console blocks are for a POSIX shell")
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_the_pages_commands_print_what_the_page_shows(
-    page: Path, tmp_path: Path
+    page: Path, tmp_path: Path, magbend, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setenv("COLUMNS", "100")
     pairs = transcript(page)
     assert pairs
     matches = doctest.OutputChecker().check_output
     flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
     for command, shown in pairs:
-        if command.startswith("make "):
+        program, *words = shlex.split(command)
+        if program == "make":
             continue
-        printed = run(command, tmp_path)
+        assert program == "magbend"
+        done = magbend(*words, cwd=tmp_path)
+        assert done.returncode == 0, f"$ {command}\n{done.stdout}{done.stderr}"
         if shown.strip():
-            assert matches(shown, printed, flags), (
-                f"$ {command}\nshown:\n{shown}\nprinted:\n{printed}"
+            assert matches(shown, done.stdout, flags), (
+                f"$ {command}\nshown:\n{shown}\nprinted:\n{done.stdout}"
             )

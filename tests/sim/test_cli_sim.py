@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from pathlib import Path
 
@@ -283,20 +282,6 @@ def test_studies_bend_the_way_the_paper_says() -> None:
 def test_bad_values_of_a_study_are_refused(name: str, value: str) -> None:
     with pytest.raises(InputError):
         sweep(name, gmc(2), UniformField(flux_mT=50.0), values=[value])
-
-
-def test_shape_loads_little() -> None:
-    code = (
-        "import sys; from magbend.cli.main import app\n"
-        "sys.argv = 'magbend sim shape --gmc 2 --field-mT 50'.split()\n"
-        "try:\n    app()\nexcept SystemExit:\n    pass\n"
-        "heavy = ('scipy.optimize', 'pandas', 'matplotlib', 'pydantic', 'rich')\n"
-        "print([name for name in heavy if name in sys.modules])"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.splitlines()[-1] == "[]"
 
 
 def test_sweep_refuses_its_folder_before_it_solves(

@@ -154,8 +154,7 @@ OFF_ITS_PLANE = Magnet.cube(55.0, 1.305, elevation_deg=20.0, offset_mm=(5.0, 0.0
 HELD = Support(gravity_m_s2=(1.0, -2.0, -9.5), clamp_angle_deg=15.0)
 
 
-@pytest.mark.parametrize("name", DRAWN)
-def test_a_rod_drawn_out_of_its_plane_is_followed_all_the_way(name: str) -> None:
+def drawn(name: str) -> tuple[Rod, MagnetField]:
     one = DRAWN[name]
     along_y, along_z = (one.get(f"remanence_{axis}_mT", [0.0, 0.0]) for axis in "yz")
     rod = Rod(
@@ -173,15 +172,27 @@ def test_a_rod_drawn_out_of_its_plane_is_followed_all_the_way(name: str) -> None
             )
         ),
     )  # fmt: skip
-    field = MagnetField(magnet=OFF_ITS_PLANE, gap_mm=one["gap_mm"])
+    return rod, MagnetField(magnet=OFF_ITS_PLANE, gap_mm=one["gap_mm"])
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_a_rod_drawn_out_of_its_plane_is_followed_all_the_way(name: str) -> None:
+    rod, field = drawn(name)
     check = check_spatial(rod, field, support=HELD)
     assert (check.load, check.morse_index) == (1.0, 0)
     found = solve_spatial(rod, field, support=HELD)
     assert found.status == "stable"
     assert np.abs(check.at(found.s_mm) - found.r_mm).max() < found.error_mm < 1e-3
-    (row,) = solve_spatial_many(
-        {key: [value] for key, value in one.items()}, magnet=OFF_ITS_PLANE, support=HELD
-    )
+
+
+FIRST, *OTHERS = DRAWN
+
+
+@pytest.mark.parametrize("name", [pytest.param(FIRST, marks=pytest.mark.slow), *OTHERS])
+def test_a_batch_follows_such_a_rod_too(name: str) -> None:
+    check = check_spatial(*drawn(name), support=HELD)
+    columns = {key: [value] for key, value in DRAWN[name].items()}
+    (row,) = solve_spatial_many(columns, magnet=OFF_ITS_PLANE, support=HELD)
     assert (row["outcome"], row["morse_index"]) == (0, 0)
     tip = [row[f"tip_{axis}_mm"] for axis in "xyz"]
     assert np.abs(np.subtract(tip, check.tip_mm)).max() < row["error_mm"] < 1e-2

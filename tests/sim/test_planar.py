@@ -341,7 +341,7 @@ good = {
 }
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(values=st.fixed_dictionaries(good), gravity=st.floats(-20.0, 20.0))
 def test_any_rod_in_any_uniform_field_ends_in_an_outcome(
     values: dict[str, float], gravity: float
