@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
+import pytest
 
 from magbend.vision import Measurement, Pose, as_photo, extract
+from magbend.vision.picture.srgb import encode_srgb
 from magbend.vision.synthetic import (
     Block,
     Scene,
@@ -12,7 +15,7 @@ from magbend.vision.synthetic import (
     render_scene,
     scene_camera,
 )
-from magbend.vision.synthetic.square_view import HARD, curve, draw
+from magbend.vision.synthetic.square_view import CLEAN, HARD, curve, draw
 
 HEIGHT_MM, TOP_MM = 0.9, 4.0
 
@@ -79,3 +82,25 @@ def test_deep_shade_widens_the_direction_by_as_much_as_it_turns_it():
         score.append(((error + 180.0) % 360.0 - 180.0) / found.clamp_angle_sd_deg)
     # Without what is stated for the shade errors are two to three times the deviation.
     assert 0.3 < np.sqrt(np.mean(np.square(score))) < 1.8
+
+
+@pytest.mark.parametrize("bright", [0.06, 0.12])
+def test_light_that_changes_on_the_rod_beside_its_clamp_widens_the_direction(bright):
+    """A lamp that shines past the clamp lights one half of the first width."""
+    frame = draw(
+        curve("arc", angle_deg=40.0, length_mm=20.0), np.random.default_rng(2),
+        light=CLEAN, size_px=(700, 500), clamp_px=(120.0, 250.0), angle_deg=0.0,
+    )  # fmt: skip
+    lit = frame.linear.copy()
+    band = lit[241:250, 126:148]
+    band[:] = cv2.GaussianBlur(band + np.float32(bright), (0, 0), 0.8)
+    plain, found = (
+        extract(
+            as_photo(encode_srgb(light)), frame.truth.calibration,
+            clamp_square_sd_deg=90.0,
+        )
+        for light in (frame.linear, lit)
+    )  # fmt: skip
+    assert found.pose is not None
+    assert found.clamp_angle_sd_deg > 1.5 * plain.clamp_angle_sd_deg
+    assert abs(found.pose.angle_deg) < 2.0 * found.clamp_angle_sd_deg

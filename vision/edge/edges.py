@@ -114,6 +114,14 @@ class Edges:
         away = np.abs(width - median(width))
         return np.asarray(away < max(5.0 * 1.4826 * median(away), least))
 
+    def relit(self, blur: float) -> Array:
+        """How far either edge would move by what the rod's light changes along it, px.
+
+        Were the change all on that side: half of it, over the slope of the edge.
+        """
+        change = np.abs(self.inner - median(self.inner)) / self.contrast
+        return np.nan_to_num(0.5 * _ROOT_2PI * blur * change)
+
     def shaded(self, blur: float) -> Array:
         """Half the difference of what the paper's slope does to either edge, px."""
         reach = 1.5 * clear_of(blur)

@@ -26,7 +26,7 @@ from .told_clamp import ToldClamp, surer_direction
 
 Array = NDArray[np.float64]
 
-SUPPLE, SUPPLE_FREEDOM = 1.0, 5.0
+SUPPLE, SUPPLE_FREEDOM = 1.2, 5.0
 """Factor on the fit's own deviation of the direction at the clamp for a curve of so
 many free numbers, and with the root of more: they were chosen by the same points."""
 BENT_BACK, BACK, BENT = 1.5, 0.25, 0.01
@@ -39,11 +39,12 @@ dark: its light is not known), by which the midline is off all along, with one s
 LONE_DEG = 1.0
 """Turn by shade beside the root above which the rod says nothing of its direction: what
 the front of the clamp tells, which may be the shade's, is then unchecked."""
-DRIFT_SHADE, DRIFT_WHITE, DRIFT_REACH = 0.15, 0.03, 1.5
+DRIFT_SHADE, DRIFT_RELIT, DRIFT_WHITE, DRIFT_REACH = 0.15, 2.0, 0.03, 1.5
 DRIFT_BENT, DRIFT_PALE_BENT = 0.17, 0.4
-"""Errors that neighbours share over so many widths: of the shade's pull; of the blur
-where the paper is white; and, px, by the angle that a rod turns over its width, for
-then the light on its sides changes."""
+"""Errors that neighbours share over so many widths: of the shade's pull; of what an
+edge may move where the light on the rod changes, as in the shade of its clamp; of the
+blur where the paper is white; and, px, by the angle that a rod turns over its width,
+for then the light on its sides changes."""
 APART = 3.0
 """Deviations by which rod and front may differ before one of them is doubted."""
 _BASE_PX = 20.0
@@ -193,6 +194,7 @@ def _rod_sd(refined: Refined, wall: Array, seen_in: View) -> float:
         else (TURN_PALE_WALL, DRIFT_PALE_BENT)
     )  # fmt: skip
     drift = np.hypot(bent * fit.curve.kappa * width, DRIFT_SHADE * refined.shaded)
+    drift = np.hypot(drift, DRIFT_RELIT * refined.relit)
     white = DRIFT_WHITE * refined.saturated * refined.blur
     both = sorted((fit.curve.kappa.max(), -fit.curve.kappa.min()))
     free = BENT_BACK if both[0] > max(BACK * both[1], BENT / width) else 1.0
