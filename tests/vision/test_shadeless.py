@@ -8,12 +8,14 @@ import cv2
 import numpy as np
 import pytest
 
+from magbend.vision import extract
 from magbend.vision.find.candidate import Candidate
 from magbend.vision.find.ground import LUMINANCE, View
 from magbend.vision.find.shadeless import in_its_colour, shades
 from magbend.vision.picture.photo import as_photo
 
 TAN, RED, BLACK = (0.26, 0.43, 0.58), (0.04, 0.04, 0.45), (0.03, 0.03, 0.03)
+BLUE, BROWN = (0.35, 0.1, 0.05), (0.03, 0.06, 0.14)
 PAPER, WIDTH, AT = np.array([0.70, 0.75, 0.74]), 20.0, 100.0
 X = np.arange(60.0, 340.0)
 
@@ -32,11 +34,12 @@ def covered(axis, width=WIDTH):
     return cv2.resize(fine, (400, 200), interpolation=cv2.INTER_AREA)[..., None] / 255.0
 
 
-def drawn(rod, *, kept, aside, coarse=False, other=None):
+def drawn(rod, *, kept, aside, coarse=False, other=None, gloss=0.0):
     """Return a photograph of a rod whose shade keeps a share of each colour."""
     light = PAPER * (1.0 - (1.0 - np.array(kept)) * covered(bent(aside)))
     for colour, axis in ((rod, bent(0.0)), *([] if other is None else [other])):
         light = light + (np.array(colour) - light) * covered(axis)
+    light = light + gloss * covered(bent(0.2 * WIDTH), 0.2 * WIDTH)
     light = cv2.GaussianBlur(light, (0, 0), 0.8)
     light += np.random.default_rng(0).normal(0.0, 0.003, light.shape)
     code = 255.0 * (1.055 * np.clip(light, 0.004, 1.0) ** (1 / 2.4) - 0.055)
@@ -104,6 +107,16 @@ def test_it_is_the_paper_beside_the_rod_that_has_no_colour():
     code = cv2.multiply(photo.decode(), (0.6, 1.0, 1.0, 0.0))
     desk[:200, :400] = code
     assert seen(as_photo(desk))[1].mix is None
+
+
+@pytest.mark.parametrize("rod", [BLUE, BROWN])
+def test_dark_is_a_flank_beside_a_streak_of_gloss_only_in_the_rod_s_colour(rod):
+    """Paper between a rod and its shade is no streak, nor the shade the rod's rim."""
+    photo = drawn(rod, kept=(0.35,) * 3, aside=22.0, gloss=0.9)
+    found = extract(photo, None, clamp="none")
+    axis = np.interp(found.points["x_px"], *bent(0.0).T)
+    assert abs(found.points["y_px"] - axis)[3:-3].max() < 0.15
+    assert "other_rod" not in found.flags
 
 
 def told(photo, things):

@@ -19,7 +19,7 @@ from ..edge.state import LostError
 from ..find.candidate import Candidate
 from ..find.choose import find_rod, search_rod
 from ..find.coloured import shows_another
-from ..find.ground import View
+from ..find.ground import LUMINANCE, View
 from ..find.shadeless import in_its_colour, in_lightness
 from ..find.track import Start, start_curve
 from ..measurement import Measurement, Pose, failure
@@ -125,7 +125,7 @@ def _measure(photo: Photo, setting: Setting) -> Measurement:
     try:
         rod, view = find_rod(photo, sought)
         quick = measure_candidate(photo, setting, rod, view)
-        if _is_sure(quick, rod) and not shows_another(photo, rod):
+        if _is_sure(quick, rod, view) and not shows_another(photo, rod):
             return quick
     except LostError as lost:
         doubt = lost
@@ -142,10 +142,14 @@ def _measure(photo: Photo, setting: Setting) -> Measurement:
     return whole if quick is None else _better(quick, whole)
 
 
-def _is_sure(quick: Measurement, rod: Candidate) -> bool:
-    """Whether one level of lightness may have shown the whole rod, and no shade."""
+def _is_sure(quick: Measurement, rod: Candidate, view: View) -> bool:
+    """Whether one level of lightness may have shown the whole rod, and no shade.
+
+    What was measured by a colour of its own all along is none.
+    """
     doubts = {TIP_GOES_ON, OTHER_COLOUR, "clamp_at_border"} & set(quick.flags)
-    return not doubts and rod.ratio < PALE
+    coloured = quick.mix not in (None, LUMINANCE, view.mix)
+    return not doubts and (coloured or rod.ratio < PALE)
 
 
 def _doubted(quick: Measurement) -> Measurement:
@@ -186,15 +190,15 @@ def measure_candidate(
         If there is nothing to vouch for.
     """
     strip = along_candidate(view, candidate)
-    far, glossy = _far(strip), is_parted(strip)
-    if glossy or far is not None:
-        # No shade is hard then; and a streak, which may leave a rim of the rod, has the
-        # colour of the paper.
-        rod, seen = candidate, in_lightness(photo, None if glossy else candidate, view)
-    else:
+    far, parted = _far(strip), is_parted(strip)
+    rod, seen = candidate, view
+    if far is None:  # no shade is hard otherwise
         rod, seen = in_its_colour(photo, candidate, view)
+    if seen.plain and (parted or far is not None):
+        # A streak may have left but a rim: its picture is needed farther from that.
+        rod, seen = candidate, in_lightness(photo, None if parted else candidate, view)
     if seen is view:
-        return _measured_in(photo, setting, rod, view, strip, far, glossy=glossy)
+        return _measured_in(photo, setting, rod, view, strip, far, glossy=parted)
     try:
         new = along_candidate(seen, rod)
         return _measured_in(
@@ -202,7 +206,7 @@ def measure_candidate(
         )  # fmt: skip
     except LostError:
         plain = _measured_in(
-            photo, setting, candidate, view, strip, far, glossy=glossy
+            photo, setting, candidate, view, strip, far, glossy=parted
         )  # fmt: skip
         return _doubted(plain)
 

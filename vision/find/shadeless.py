@@ -63,7 +63,7 @@ the rod's, or the rod's over that, at least."""
 _PALER = 0.04
 """How much paler than a rod without colour, of the paper's light, its shade is."""
 
-_CLOSE, _MOST = (0.55, 1.5), 0.2
+_CLOSE, _MOST = (0.55, 1.5), 0.3
 """Where a shade is seen right beside its rod, in widths from the axis; and the part
 of the stations at which it may seem darker than it is: a clamp's is there, too."""
 
