@@ -46,15 +46,6 @@ def is_marked(folder: Path) -> bool:
     return (folder / MARK / FOLDER_FILE).is_file()
 
 
-def marked_kind(folder: Path) -> str:
-    """Return what a marked folder is (``run``, ``library`` ...); empty if unknown."""
-    try:
-        data = read_file(folder / MARK / FOLDER_FILE, 0.1, StoreError)
-        return str(parse_json(data)["kind"]) if is_whole(data) else ""
-    except (ValueError, KeyError, TypeError, StoreError):
-        return ""
-
-
 def root_of(path: Path) -> Path | None:
     """Return the marked folder in which a file lies; None if there is none."""
     return next((one for one in path.resolve().parents if is_marked(one)), None)

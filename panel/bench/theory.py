@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 POINTS = 61
 MODELS = ("magnet", "uniform")
-RODS = ("nominal", "fitted")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -12,7 +13,7 @@ import pytest
 from magbend.core.derived import check_derived, note_derived, read_manifest
 from magbend.core.errors import InputError, StoreError
 from magbend.core.files import write_text
-from magbend.core.owned import MARK, is_marked, marked_kind, owning_folder, root_of
+from magbend.core.owned import FOLDER_FILE, MARK, is_marked, owning_folder, root_of
 
 HOLD = """
 import sys, pathlib
@@ -45,7 +46,8 @@ def test_a_second_process_is_told_who_writes_and_death_frees_the_folder(tmp_path
         process.kill()
         process.wait()
         with owning_folder(folder, "run", "vision extract"):
-            assert marked_kind(folder) == "run"
+            mark = json.loads((folder / MARK / FOLDER_FILE).read_bytes())
+            assert mark["kind"] == "run"
 
 
 def test_a_folder_that_was_made_and_stayed_empty_is_removed(tmp_path):
