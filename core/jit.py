@@ -127,6 +127,20 @@ class Kernel:
         return any(source.parent.glob(f"__pycache__/{name}*.nbi"))
 
     @property
+    def targetoptions(self) -> dict[str, Any]:
+        """Options in which numba finds that a kernel is written into its caller.
+
+        What one kernel alone calls is compiled once more with it: `inline="always"`
+        saves the first time.
+        """
+        return self._options
+
+    @property
+    def py_func(self) -> Callable[..., Any]:
+        """What numba writes into the caller."""
+        return self._function
+
+    @property
     def _numba_type_(self) -> Any:
         """What numba takes this for where another kernel calls it."""
         return self.compiled._numba_type_

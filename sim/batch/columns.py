@@ -159,7 +159,10 @@ def columns_of(
         if array.ndim == 1 and name in PER_SECTION:
             fits = array[:, None]
         try:
-            arrays[name] = np.ascontiguousarray(np.broadcast_to(fits, full))
+            # A copy, as what is broadcast may not be written and is another type of
+            # array to kernels, which would be compiled again.
+            wide = fits if fits.shape == full else np.broadcast_to(fits, full).copy()
+            arrays[name] = np.ascontiguousarray(wide)
         except ValueError:
             raise InputError(
                 f"designs: {name} in {COLUMNS[name][2]} must fit {n} designs of "

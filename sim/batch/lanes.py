@@ -277,7 +277,7 @@ def _judge(rows, weight, w, outcome):  # type: ignore[no-untyped-def]
     return largest
 
 
-@njit(**PART)
+@njit(**PART, inline="always")
 def _solve_block(  # type: ignore[no-untyped-def]
     rows, rods, length, margin, gap, before, field,
     start, steps, w, out, outcome,

@@ -209,15 +209,15 @@ def solve_shapes(
     stations = np.linspace(0.0, 1.0, points)[None]
     if by_section:
         stations = _section_stations(rods[:, ::-1, 0], points)
-    stations = np.broadcast_to(stations, (n, points))
     if designs.magnet is not None:
         fields = field_rows(before(designs.magnet), designs.gap_mm, total_mm)
     elif designs.flux_mT is not None:
         fields = uniform_rows(designs.flux_mT * 1e-3, designs.angle_deg)
 
     def work(rows: slice) -> None:
+        here = stations if len(stations) == 1 else stations[rows]
         _solve(
-            stations[rows], rods[rows], fields[rows], total_mm[rows], margins[rows],
+            here, rods[rows], fields[rows], total_mm[rows], margins[rows],
             out[rows], status[rows], error[rows],
         )  # fmt: skip
 

@@ -229,7 +229,7 @@ def _predict(w):  # type: ignore[no-untyped-def]
     move(w)
 
 
-@njit(**OPTIONS)
+@njit(**OPTIONS, inline="always")
 def _newton(rows, steps, kind, first, own, b, w, outcome):  # type: ignore[no-untyped-def]
     """Find the tips by `steps` steps a section; return whether any is left.
 
@@ -277,7 +277,7 @@ def _near(field, tip, margin):  # type: ignore[no-untyped-def]
     return False
 
 
-@njit(**OPTIONS)
+@njit(**OPTIONS, inline="always")
 def _solve_block(  # type: ignore[no-untyped-def]
     rows, rods, fields, Rc, margins, steps, loads, own, b, w, out, outcome
 ):

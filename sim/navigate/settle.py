@@ -110,7 +110,7 @@ def softest(L, K, last, d):  # type: ignore[no-untyped-def]
             d[i] *= 1e-3 / most
 
 
-@njit(**PART)
+@njit(**PART, inline="always")
 def newton(rod, field, walls, half, u, bent, t, stiff, held, before, work):  # type: ignore[no-untyped-def]
     """Minimise the augmented energy; return steps taken, stability and largest turn.
 

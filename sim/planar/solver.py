@@ -118,7 +118,7 @@ def _rounding(reach, columns, D, d):  # type: ignore[no-untyped-def]
     return ROUNDING * (1.0 + reach) * total
 
 
-@njit(**PART)
+@njit(**PART, inline="always")
 def _solve_row(  # type: ignore[no-untyped-def]
     rod, field, clamp, margin, s, order, step, cold, u, found, out, X, D, T, C, d
 ):

@@ -140,7 +140,7 @@ def stability(rod, field, base, clamp, load, u, X, S, b, trails, D):  # type: ig
     return zeros
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def solve_from(rod, field, base, clamp, u, trails, D):  # type: ignore[no-untyped-def]
     """Find the equilibrium of full load, from u or by following the load from zero.
 
@@ -171,7 +171,7 @@ def solve_from(rod, field, base, clamp, u, trails, D):  # type: ignore[no-untype
     return index, 1.0, error, X[1]
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _follow(rod, field, base, clamp, u, X, S, b, trails, D):  # type: ignore[no-untyped-def]
     """Follow the load from zero in u; return the load reached."""
     u[0], u[1], u[2], u[3] = 0.0, math.cos(clamp), math.sin(clamp), clamp

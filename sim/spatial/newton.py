@@ -217,7 +217,7 @@ def newton(rod, field, load, n, Rc, R, r, first, goal, J, held):  # type: ignore
     return False, start, end
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def follow(rod, field, bends, n, Rc, R, r, goal, J, held):  # type: ignore[no-untyped-def]
     """Follow the equilibrium from no load, at (R, r), to full load.
 
@@ -269,7 +269,7 @@ def follow(rod, field, bends, n, Rc, R, r, goal, J, held):  # type: ignore[no-un
     return index if load == 1.0 else LOST, load
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def solve_pose(rod, field, n, Rc, R, r, goal, held):  # type: ignore[no-untyped-def]
     """Find the tip's pose (R, r) at full load, by n steps and once by 2 n.
 
@@ -320,7 +320,7 @@ def solve_pose(rod, field, n, Rc, R, r, goal, held):  # type: ignore[no-untyped-
     return index, 1.0, error + 1e-15 * n
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def solve_sure(rod, field, n, Rc, R, r, goal):  # type: ignore[no-untyped-def]
     """Find the pose as `solve_pose`; believe what finer steps agree on.
 

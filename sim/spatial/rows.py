@@ -52,7 +52,7 @@ def _leaves(rod, n, curve, box, s, states):  # type: ignore[no-untyped-def]
     return False
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _solve(rod, field, Rc, margin, box, R, r, s, states):  # type: ignore[no-untyped-def]
     """Return outcome, Morse index and error of one rod, and leave its tip's pose."""
     reach, turn = loads_on(rod, field, Rc[:, 2])

@@ -83,6 +83,7 @@ def pose(
     joints: Sequence[float] = (), shared: float = SHARED, within: float = 0.0,
 ) -> Problem:  # fmt: skip
     """Return the problem about a curve with these tangent angles; see `fit_curve`."""
+    theta = np.ascontiguousarray(theta)
     knots = knots_between(s[0], s[-1], spacing, joints)
     basis, middle = design(knots, s), design(knots, 0.5 * (s[1:] + s[:-1]))
     stiff, _ = penalty_on_moment(knots, Smooth(), s, theta)

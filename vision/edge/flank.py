@@ -127,8 +127,8 @@ def fit_flanks(
     if near is not None:
         at, blur = np.column_stack([near.place, near.rod, near.paper]), near.blur
     at, blur = _fit(
-        x, np.asarray(light, np.float64), np.nan_to_num(at), float(blur), known, wide,
-        share, float(sky),
+        x, np.ascontiguousarray(light, np.float64), np.nan_to_num(at), float(blur),
+        known, wide, share, float(sky),
     )  # fmt: skip
     return Flanks(place=at[:, 0], rod=at[:, 1], paper=at[:, 2], blur=blur)
 
