@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from magbend.core import Section, Specimen
-from magbend.vision import as_photo
+from magbend.vision import as_photo, extract
 from magbend.vision.extraction.extract import measure
 from magbend.vision.extraction.setting import Setting, with_specimen
 from magbend.vision.synthetic import scene_camera
@@ -28,10 +28,10 @@ CIRCLE = 0.5 * np.column_stack([np.cos(TURN), np.sin(TURN)])
 FLAT = np.array([[-0.5, -0.2], [0.5, -0.2], [0.5, 0.2], [-0.5, 0.2]])
 
 
-def outline(ends_mm, section_mm):
+def outline(ends_mm, section_mm, camera=CAMERA):
     """Return the hull, in the picture, of a section carried from end to end."""
     seen = [
-        CAMERA.to_px((s * ALONG + y * ACROSS)[None], height_mm=z)[0]
+        camera.to_px((s * ALONG + y * ACROSS)[None], height_mm=z)[0]
         for s in ends_mm
         for y, z in section_mm
     ]
@@ -39,10 +39,14 @@ def outline(ends_mm, section_mm):
 
 
 def photograph(section):
-    light = np.full(SIZE[::-1], 0.7, np.float32)
     rod = outline((-12.5, LENGTH - 12.5), WIDTH * section + [0.0, HEIGHT])
     wall = np.array([[-5.0, 0.0], [5.0, 0.0], [5.0, 3.0], [-5.0, 3.0]])
-    for corners, shade in ((rod, 0.03), (outline((-19.0, -12.5), wall), 0.12)):
+    return drawn((rod, 0.03), (outline((-19.0, -12.5), wall), 0.12))
+
+
+def drawn(*things):
+    light = np.full(SIZE[::-1], 0.7, np.float32)
+    for corners, shade in things:
         mask = np.zeros((SIZE[1] * FINE, SIZE[0] * FINE), np.uint8)
         fixed = np.round(((corners + 0.5) * FINE - 0.5) * 16).astype(np.int32)
         cv2.fillPoly(mask, [fixed.reshape(-1, 1, 2)], 255, shift=4)
@@ -89,3 +93,22 @@ def test_a_round_rod_ends_where_the_middle_of_its_rim_does():
         for is_round in (True, False)
     )
     assert abs(round_mm - LENGTH) < 0.006 < abs(square_mm - LENGTH)
+
+
+@pytest.mark.parametrize("away_deg", [40.0, 220.0])
+def test_the_disc_of_a_chuck_is_no_front_on_the_paper(away_deg):
+    """Its rim is neither at the paper nor, beside the rod, at its top."""
+    camera = scene_camera(
+        size_px=SIZE, focal_px=4200.0, height_mm=300.0, tilt_deg=8.0,
+        tilt_direction_deg=away_deg, target_mm=(0.0, 0.0),
+    )  # fmt: skip
+    height, radius = 3.5, 2.5
+    rod = outline((-12.5, LENGTH - 12.5), WIDTH * CIRCLE + [0.0, height], camera)
+    disc = outline((-19.0, -12.5), 2.0 * radius * CIRCLE + [0.0, height], camera)
+    things = (rod, 0.03), (disc, 0.12)  # What is nearer to the camera comes last.
+    found = extract(
+        drawn(*(things[::-1] if away_deg < 180.0 else things)), camera, is_round=True,
+        rod_height_mm=height, clamp_height_mm=height + radius,
+    )  # fmt: skip
+    off = abs(found.length_mm - LENGTH)
+    assert 0.02 < off < 2.0 * found.length_sd_mm

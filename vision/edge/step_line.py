@@ -36,6 +36,8 @@ _ROUNDS, _ROUNDS_OWN = 3, 4
 _OUTLYING, _LEAST_OFF, _ALIKE = 4.0, 0.02, 4.0
 """Median pulls beyond which a lane counts less, with so many px more; and lanes that
 tell as much as one."""
+_SURE = 3.0
+"""Standard deviations by which a line must bulge not to be straight."""
 _LEAST_PIVOT = 1e-6
 
 
@@ -60,6 +62,9 @@ class EndFace(NamedTuple):
     uneven : float
         How far it moves with more of the paper before it, px; 0 where its lanes have
         no levels of their own.
+    bulge : float
+        How far its middle stands out over its ends, as a parabola through the lanes,
+        px; 0 where it is straight as far as they tell, or none was fitted.
     """
 
     s: float
@@ -71,6 +76,7 @@ class EndFace(NamedTuple):
     blur: float = 0.0
     skew_sd: float = 0.0
     uneven: float = 0.0
+    bulge: float = 0.0
 
     @property
     def place_sd(self) -> float:
@@ -101,7 +107,7 @@ class Crossed(NamedTuple):
     line: EndFace
 
 
-NOT_SEEN = EndFace(np.nan, np.nan, np.nan, np.nan, 0.0, 0.0, 0.0, np.nan, 0.0)
+NOT_SEEN = EndFace(np.nan, np.nan, np.nan, np.nan, 0.0, 0.0, 0.0, np.nan, 0.0, 0.0)
 
 
 def lanes(
@@ -232,22 +238,40 @@ def _fitted(
     if not (abs(place - line.s) < 2.0 * wide and np.any(known != 0.0)):
         return line, 0.0
     share = known / np.sum(known)
-    scatter, sigma, skew_sd = line.scatter, line.sigma, line.skew_sd
+    scatter, sigma, skew_sd, bulge = line.scatter, line.sigma, line.skew_sd, 0.0
     if own:
         scatter = np.sqrt(np.sum(share * off**2))
         middle = np.sum(share * across)
         spread = np.sqrt(np.sum(share * (across - middle) ** 2))
         alone = scatter * np.sqrt(_ALIKE * np.sum(share**2)) + 0.005
         sigma, skew_sd = alone * np.hypot(1.0, middle / spread), alone / spread
+        bulge = _bulge(across, off, share)
     height = np.sum(share * rise)
     found = EndFace(
-        place, sigma, skew, scatter, line.found, height, fitted, skew_sd, uneven
+        place, sigma, skew, scatter, line.found, height, fitted, skew_sd, uneven, bulge
     )
     white = 0.0
     for sign in (1.0, -1.0):
         if WHITE < np.nanmax(sign * light) <= HELD:
             white = sign
     return found, white
+
+
+@njit(cache=True)
+def _bulge(across: Array, off: Array, share: Array) -> float:
+    """Return how far the middle of lanes stands out over their ends; 0 if unsure."""
+    if not np.min(across) < 0.0 < np.max(across):
+        return 0.0
+    x = across / np.max(np.abs(across))
+    middle = np.sum(share * x)
+    spread = np.sum(share * (x - middle) ** 2)
+    square = x**2 - np.sum(share * x**2)
+    square -= (x - middle) * np.sum(share * square * (x - middle)) / spread
+    power = np.sum(share * square**2)
+    bulge = -np.sum(share * square * off) / power
+    left = np.sum(share * (off + bulge * square) ** 2)
+    sd = np.sqrt(_ALIKE * left * np.sum((share * square) ** 2)) / power
+    return bulge if np.abs(bulge) > _SURE * sd else 0.0
 
 
 @njit(cache=True)
@@ -406,7 +430,7 @@ def line_through(light: Array, s: Array, across: Array, crossing: Array) -> Cros
         place, slope, scatter, used, spread = _fit_line(across, crossing)
         sigma, part = scatter / np.sqrt(used) + 0.005, found / crossing.size
         line = EndFace(
-            place, sigma, slope, scatter, part, 0.0, 0.0, sigma / spread, 0.0
+            place, sigma, slope, scatter, part, 0.0, 0.0, sigma / spread, 0.0, 0.0
         )
     return Crossed(light, s, across, crossing, line)
 

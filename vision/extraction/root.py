@@ -23,11 +23,17 @@ from .setting import UNKNOWN_CLAMP_MM, Setting
 HIDDEN_MM = 0.05
 """What part of the root a clamp of unknown height may hide before that is named."""
 
-BORDER_PX, CARRIED, BETWEEN, SMEARED = 0.3, 0.01, 0.15, 1.3
+BORDER_PX, CARRIED, BETWEEN, SMEARED = 0.3, 0.01, 0.3, 1.3
 """Standard deviation of a place: px, of where a rod enters the picture; as shares of
 how far a line is carried to the height of the axis, of how far two lines are apart, and
 of what blurs a line more than the rod's sides and its tip: the front of a shade, seen
 as one line with the clamp's (errors of 0.6 to 2 times that on drawings)."""
+
+ROUND, ROUND_CARRIED = 0.3, 0.7
+"""How far the front of a chuck, a disc, bulges toward the tip where it is seen aslant,
+over what as much height as the rod is wide is shifted (0.3 for a disc eight times as
+wide as the rod, more for a smaller one); and the doubt of how far its rim is carried
+to the height of the axis, of which it may be anything up to the radius away."""
 
 _STEP_PX = 20.0
 """Length over which lines are taken for straight."""
@@ -80,12 +86,18 @@ def root_place(
         return RootPlace(s=0.0, sd=BORDER_PX)
     rise = float(ends.rise_along[0])
     face, front = refined.clamp.face, refined.clamp.front
+    shifted = abs(rise) / float(ends.along[0]) * refined.typical_width
+    is_round = front is not None and front.bulge > ROUND * shifted
+    share = ROUND_CARRIED if is_round else CARRIED
     if rise > 0.0:
         hidden = hidden_px(refined, setting, rise) / math.sqrt(3.0)
         place, line = _hidden_root(refined, ends, setting), front or face
         carried = 0.0 if line is None else place - line.s
-        sd = _sd(refined, line, carried, hidden)
+        sd = _sd(refined, line, share * carried, hidden)
         return RootPlace(s=place, sd=sd, hidden=hidden)
+    if is_round and face is not None:
+        # Its rim is at no height that is known; the rod's own lanes are.
+        front, share = None, CARRIED
     seen_at, axis_mm = [], setting.axis_height_mm
     if face is not None:
         seen_at.append(_below(refined, face, axis_mm + rim_mm, setting))
@@ -96,25 +108,25 @@ def root_place(
     if face is None or front is None:
         line = front or face
         carried = 0.0 if line is None else seen_at[0] - line.s
-        return RootPlace(s=seen_at[0], sd=_sd(refined, line, carried))
+        return RootPlace(s=seen_at[0], sd=_sd(refined, line, share * carried))
     apart, carried = seen_at[1] - seen_at[0], seen_at[1] - front.s
     if abs(apart) <= APART_PX:
         place = between(seen_at[0], seen_at[1], refined.clamp)
         clear = max(face, front, key=lambda line: line.rise)
-        sd = _sd(refined, clear, carried, BETWEEN * apart)
+        sd = _sd(refined, clear, CARRIED * carried, BETWEEN * apart)
         return RootPlace(s=place, sd=sd, apart=apart)
     if is_face(apart, setting.face_px(refined.fit.curve)):
-        return RootPlace(s=seen_at[1], sd=_sd(refined, front, carried))
+        return RootPlace(s=seen_at[1], sd=_sd(refined, front, CARRIED * carried))
     return RootPlace(s=seen_at[0], sd=0.5 * abs(apart), apart=apart)
 
 
 def _sd(
-    refined: Refined, line: EndFace | None, carried: float, other: float = 0.0
-) -> float:
-    """Return the deviation of a place from a line that was carried so far, px."""
+    refined: Refined, line: EndFace | None, *doubts: float
+) -> float:  # fmt: skip
+    """Return the deviation of a place that a line tells, with other doubts, px."""
     own = 0.0 if line is None else line.place_sd
     smeared = 0.0 if line is None else SMEARED * smeared_px(refined, line.blur)
-    return math.hypot(own, smeared, CARRIED * carried, other)
+    return math.hypot(own, smeared, *doubts)
 
 
 def smeared_px(refined: Refined, blur: float) -> float:
