@@ -28,9 +28,10 @@ deep shade 0.3, and the fibres of paper 0.02."""
 FAINT = (0.1, 0.085, 0.07, 0.055, 0.045)
 """The same for what is nearly as light as the paper, where nothing else is seen."""
 
-_SAMPLE = 1500
+_SAMPLE, _EVERY = 1500, 8
 _FALLS_OFF, _GRAIN = 0.4, 0.006
-"""Pixels that tell the paper's light; by how much it may fall off across the picture,
+"""Pixels that tell the paper's light, and of it, once fitted, one of so many along and
+across; by how much it may fall off across the picture,
 as a logarithm; and how far noise scatters dark ones."""
 
 LUMINANCE = (0.114, 0.587, 0.299)
@@ -40,6 +41,9 @@ rod blurs into the paper."""
 
 _BETTER = 1.5
 """So much more must a mix of colours tell rod from paper than lightness does."""
+
+_ROOM = 11.0
+"""How far about a rod its picture is looked at later, in widths."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,18 +81,21 @@ def ground_distance(photo: Photo) -> Binary:
     small = shrunk(light, factor)
     height, width = small.shape[:2]
     small = small.reshape(height, width, -1)
-    bare = np.dstack([_paper_light(small[..., k]) for k in range(small.shape[2])])
-    typical = np.median(bare, axis=(0, 1)).astype(np.float32)
-    level = np.clip(small / bare * typical, 0.0, 1.5)
+    bare = [_paper_light(small[..., k]) for k in range(small.shape[2])]
+    typical = np.array([np.median(each[::_EVERY, ::_EVERY]) for each in bare])
+    shade = [each / light for each, light in zip(bare, typical, strict=True)]
+    level = np.clip(small / cv2.merge(shade).reshape(small.shape), 0.0, 1.5)
     if level.shape[2] == 1:
         level, typical = np.repeat(level, 3, axis=2), np.repeat(typical, 3)
     brightest = np.quantile(level[::4, ::4].max(axis=2), 0.998)
     white = np.float32(max(1e-3, float(typical.max()), float(brightest)))
-    lab = cv2.cvtColor(np.ascontiguousarray(level / white), cv2.COLOR_LBGR2Lab)
+    level /= white
+    lab = cv2.cvtColor(level, cv2.COLOR_LBGR2Lab)
     paper = cv2.cvtColor((typical / white).reshape(1, 1, 3), cv2.COLOR_LBGR2Lab)
-    away = np.sqrt(np.sum((lab - paper) ** 2, axis=2)) / np.float32(100.0)
+    apart = cv2.absdiff(lab, np.append(paper.astype(np.float64), 0.0))
+    away = np.sqrt(np.square(apart) @ np.ones(3, np.float32))
     return Binary(
-        ratio=np.asarray(1.0 - away, np.float32),
+        ratio=np.asarray(1.0 - away / np.float32(100.0), np.float32),
         mask=np.zeros((height, width), np.uint8), factor=factor, inverted=False,
         dark=0.0, threshold=0.0,
     )  # fmt: skip
@@ -110,11 +117,10 @@ def best_view(photo: Photo, points_px: Array, width_px: float) -> View:
     grey = _sampled(photo.grey, rod)
     paper = 0.5 * (_sampled(photo.grey, left) + _sampled(photo.grey, right))
     own = View(grey=photo.grey, sign=1.0 if median(paper - grey) > 0.0 else -1.0)
-    colour = photo.colour()
-    if colour is None:
+    colours = photo.colour_at(np.stack([left, right, rod]))
+    if colours is None:
         return own
-    step = 0.5 * (_sampled(colour, left) + _sampled(colour, right))
-    step = step - _sampled(colour, rod)
+    step = 0.5 * (colours[0] + colours[1]) - colours[2]
     towards = np.median(step, axis=0)
     mixes = [np.eye(3)[k] * np.sign(towards[k] or 1.0) for k in range(3)]
     mixes.append(towards / max(float(np.abs(towards).sum()), 1e-9))
@@ -123,9 +129,14 @@ def best_view(photo: Photo, points_px: Array, width_px: float) -> View:
     if contrast[best] < _BETTER * quantile(own.sign * (paper - grey), 0.1):
         return own
     mix = 0.65 * mixes[best] / max(median(step @ mixes[best]), 1e-6)
-    mixed = np.asarray(colour @ mix.astype(np.float32), np.float32)
     b, g, r = (float(part) for part in mix)
-    return View(grey=mixed, sign=1.0, mix=(b, g, r))
+    return mixed(photo, (b, g, r), 1.0, about(points_px, width_px))
+
+
+def about(points_px: Array, width_px: float) -> Array:
+    """Return places about which the picture of a rod is looked at later, (n, 2)."""
+    reach = _ROOM * width_px
+    return np.vstack([points_px - reach, points_px + reach])
 
 
 def mixed(
@@ -190,8 +201,10 @@ def _paper_light(work: Image) -> Image:
         light = np.maximum(basis @ coefficients, 0.2 * middle)
     y, x = (np.linspace(-1.0, 1.0, side, dtype=np.float32) for side in work.shape)
     c, y = coefficients.astype(np.float32), y[:, None]
-    fitted = c[0] + x * (c[1] + c[3] * x) + y * (c[2] + c[5] * y + c[4] * x)
-    return np.asarray(np.maximum(fitted, 0.2 * middle), np.float32)
+    fitted = (c[1] + c[4] * y) + c[3] * x
+    fitted *= x
+    fitted += c[0] + y * (c[2] + c[5] * y)
+    return np.asarray(np.maximum(fitted, np.float32(0.2 * middle)))
 
 
 def _beside(

@@ -8,6 +8,7 @@ what is wider. Edges are measured in the photograph itself, lines and all.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -15,7 +16,8 @@ from numpy.typing import NDArray
 
 from .binarise import Binary
 
-Image = NDArray[np.float32]
+_CODES = 250.0
+"""Codes of light, over the paper's, that tell lines: closing goes by them in bytes."""
 
 _DISCS = 3, 5, 7, 9, 13, 17
 """Diameters of discs that lines are thinner than, px of the working picture."""
@@ -38,24 +40,25 @@ def without_lines(binary: Binary) -> Binary | None:
     binary : Binary
         The picture; its `ratio` is 1 on the ground, and less on lines and things.
     """
-    covered = [_covered(binary.ratio, disc) for disc in (_DISCS[0], _DISCS[-1])]
-    if float(np.mean(covered[1] > _FULL)) < _EVERYWHERE:
+    coarse = np.asarray((_CODES * binary.ratio.clip(0.0, 1.0)).astype(np.uint8))
+    covered = _covered(coarse, _DISCS[-1])
+    if float(np.mean(covered > _FULL)) < _EVERYWHERE:
         return None
-    most = float(np.median(covered[1]))
+    most = float(np.median(covered))
     for disc in _DISCS:
-        if float(np.median(_covered(binary.ratio, disc))) > (1.0 - _LEFT) * most:
+        if float(np.median(_covered(coarse, disc))) > (1.0 - _LEFT) * most:
             break
     return replace(binary, ratio=_closed(binary.ratio, disc + 2))
 
 
-def _closed(ratio: Image, disc: int) -> Image:
+def _closed(ratio: NDArray[Any], disc: int) -> NDArray[Any]:
     """Return the picture without what is thinner than a disc."""
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (disc, disc))
     return np.asarray(cv2.morphologyEx(ratio, cv2.MORPH_CLOSE, kernel))
 
 
-def _covered(ratio: Image, disc: int) -> NDArray[np.float64]:
+def _covered(coarse: NDArray[np.uint8], disc: int) -> NDArray[np.float64]:
     """Return the part of each tile that is thinner than a disc."""
-    thin = (_closed(ratio, disc) - ratio > _SEEN).astype(np.float32)
+    thin = (_closed(coarse, disc) - coarse > _SEEN * _CODES).astype(np.float32)
     tiles = cv2.resize(thin, (_TILES, _TILES), interpolation=cv2.INTER_AREA)
     return np.asarray(tiles, np.float64)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..curve.robust import median
 from ..picture.photo import Photo
 from .candidate import Candidate
-from .ground import LUMINANCE, View, mixed
+from .ground import LUMINANCE, View, about, mixed
 from .track import resample
 
 Array = NDArray[np.float64]
@@ -29,9 +29,6 @@ _BESIDE, _BESIDE_PX = 3.2, 8.0
 
 _STATIONS = 60
 """About so many stations are looked at, on lanes a pixel apart."""
-
-_ROOM = 11.0
-"""How far about a rod its picture is looked at later, in widths."""
 
 _FEW, _EVERY = 4, 16
 """One of so many stations tells whether there is any colour; and of so many pixels
@@ -119,7 +116,7 @@ def in_its_colour(photo: Photo, rod: Candidate, view: View) -> tuple[Candidate, 
     mix = _discriminant(light, tint, paper)
     if np.std(light[tint > 0.8] @ mix) > _UNEVEN:
         return rod, view
-    near = _near(rod)
+    near = about(rod.points_px, rod.width_px)
     along = slice(seen[0], seen[-1] + 1)
     axis = (points + middle[:, None] * normals)[along]
     rod = replace(rod, points_px=axis, width_px=width)
@@ -140,13 +137,8 @@ def in_lightness(photo: Photo, rod: Candidate | None, view: View) -> View:
     """
     if view.mix is not None:
         return view
-    near = None if rod is None else _near(rod)
+    near = None if rod is None else about(rod.points_px, rod.width_px)
     return mixed(photo, LUMINANCE, view.sign, near)
-
-
-def _near(rod: Candidate) -> Array:
-    reach = _ROOM * rod.width_px
-    return np.vstack([rod.points_px - reach, rod.points_px + reach])
 
 
 def shades(photo: Photo, things: Sequence[Candidate]) -> tuple[Mask, Mask]:
