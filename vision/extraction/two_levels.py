@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.jit import njit
 from ..curve.robust import median
 from ..edge.edges import clear_of
 from ..find.candidate import Candidate
@@ -67,9 +68,8 @@ def rod_alone(strip: Strip, candidate: Candidate, width: float) -> Candidate | N
     found = []
     for k in np.flatnonzero(varies & closed):  # in nearly all rods nowhere
         part = across[inside[k]], light[k, inside[k]]
-        step = _step(*part, paper[k], _NARROW * width, clear)
-        if step is not None:
-            place, rise = step
+        place, rise = _step(*part, paper[k], _NARROW * width, clear)
+        if rise != 0.0:
             ends = (low[k], place) if rise > 0.0 else (place, high[k])
             found.append((middle[k], *ends))
     if len(found) < _LEAST_PARTS * PARTS:
@@ -79,26 +79,27 @@ def rod_alone(strip: Strip, candidate: Candidate, width: float) -> Candidate | N
     return replace(candidate, points_px=points, width_px=median(high - low))
 
 
+@njit(cache=True)
 def _step(
     across: Array, profile: Array, paper: float, narrow: float, clear: float
-) -> tuple[float, float] | None:
-    """Return where a profile goes from one level to another, and by how much.
+) -> tuple[float, float]:
+    """Return where a profile goes from one level to another, and by how much; or by 0.
 
     Each level is `narrow` at least; what lies within `clear` of the step is left out.
     """
-    best, found = _CLEAR, None
-    lane = float(across[1] - across[0])
+    best, place, rise = _CLEAR, 0.0, 0.0
+    lane = across[1] - across[0]
     least = max(int(narrow / lane), 3)
     gap = int(clear / lane)
     for k in range(least, len(profile) - least + 1):
-        left, right = (
-            profile[: max(k - gap, least)],
-            profile[min(k + gap, len(profile) - least) :],
-        )
-        levels = float(np.median(left)), float(np.median(right))
-        rest = np.mean(np.abs(np.concatenate([left - levels[0], right - levels[1]])))
-        step = levels[1] - levels[0]
-        clearness = abs(step) / (float(rest) + 1e-4)
-        if clearness > best and abs(step) > _STEP * (paper - min(levels)):
-            best, found = clearness, (float(across[k] - 0.5 * lane), step)
-    return found
+        left = profile[: max(k - gap, least)]
+        right = profile[min(k + gap, len(profile) - least) :]
+        near, far = np.median(left), np.median(right)
+        step = far - near
+        if abs(step) <= _STEP * (paper - min(near, far)):
+            continue
+        rest = np.abs(left - near).sum() + np.abs(right - far).sum()
+        clearness = abs(step) / (rest / (left.size + right.size) + 1e-4)
+        if clearness > best:
+            best, place, rise = clearness, across[k] - 0.5 * lane, step
+    return place, rise
