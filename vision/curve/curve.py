@@ -41,10 +41,7 @@ class Curve(NamedTuple):
     @property
     def normals(self) -> Array:
         """Unit normals to the right in the picture (y down), shape (n, 2)."""
-        normals = np.empty((len(self.theta), 2))
-        np.negative(np.sin(self.theta), out=normals[:, 0])
-        np.cos(self.theta, out=normals[:, 1])
-        return normals
+        return np.asarray(normals_of(self.theta))
 
     def reversed(self) -> Curve:
         """Return the same curve from its end on, where s is 0 less what it was."""
@@ -83,3 +80,21 @@ def points_at(curve: Curve, at: Array) -> tuple[Array, Array]:
             turned += beyond * bend
         out[i, 0], out[i, 1], angle[i] = x, y, turned
     return out, angle
+
+
+@njit(cache=True)
+def normals_of(theta: Array) -> Array:
+    """Return unit normals to the right in the picture (y down) of angles, (n, 2)."""
+    normals = np.empty((theta.size, 2))
+    normals[:, 0], normals[:, 1] = -np.sin(theta), np.cos(theta)
+    return normals
+
+
+@njit(cache=True)
+def beside(points: Array, theta: Array, offset: Array) -> Array:
+    """Return points (n, 2) moved by offsets along the normals of angles."""
+    out = np.empty_like(points)
+    for i in range(offset.size):
+        out[i, 0] = points[i, 0] - offset[i] * np.sin(theta[i])
+        out[i, 1] = points[i, 1] + offset[i] * np.cos(theta[i])
+    return out

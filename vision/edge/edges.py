@@ -12,15 +12,13 @@ mean of the two levels; that term is kept.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
-from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.jit import njit
-from ..curve.robust import median
+from ..curve.robust import _median, median
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -38,8 +36,7 @@ _SLOPE_VARIANCE = 0.171
 its weight is even over 1.5 px, and 0.1 over 0.5 px."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Edges:
+class Edges(NamedTuple):
     """Side edges along a rod, as offsets from a curve along its normals, in px.
 
     Parameters
@@ -87,21 +84,11 @@ class Edges:
     @property
     def blur(self) -> float:
         """Standard deviation of the blur, from the slope at the edges, in px."""
-        return self._blur(slice(None))
+        return float(self.blurs(1)[0])
 
     def blurs(self, parts: int) -> Array:
         """Return the blur of so many parts along the rod, shape (parts,), in px."""
-        return np.array([self._blur(part) for part in slices(len(self.low), parts)])
-
-    def _blur(self, part: slice) -> float:
-        rise = np.concatenate(
-            [
-                (self.outer_low - self.inner)[part] / self.slope_low[part],
-                (self.outer_high - self.inner)[part] / self.slope_high[part],
-            ]
-        )
-        variance = (median(rise) / _ROOT_2PI) ** 2 - _SLOPE_VARIANCE
-        return math.sqrt(max(variance, 0.01))
+        return np.asarray(_blurs(self, parts))
 
     def usable(
         self, walls: Array | float = 0.0, *, least: float = 0.6
@@ -110,9 +97,12 @@ class Edges:
 
         Those whose width is within `least` px of the median are of use in any case.
         """
-        width = self.width - walls
-        away = np.abs(width - median(width))
-        return np.asarray(away < max(5.0 * 1.4826 * median(away), least))
+        wide = self.width - walls
+        return np.asarray(_alike(wide, least))
+
+    def wander(self, lag: int) -> float:
+        """How much an edge jumps from one station to the one `lag` stations on, px."""
+        return float(_wander(self.low, self.high, lag))
 
     def relit(self, blur: float) -> Array:
         """How far either edge would move by what the rod's light changes along it, px.
@@ -124,11 +114,42 @@ class Edges:
 
     def shaded(self, blur: float) -> Array:
         """Half the difference of what the paper's slope does to either edge, px."""
-        reach = 1.5 * clear_of(blur)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            low = self.shade_low / self.slope_low
-            high = self.shade_high / self.slope_high
-        return np.nan_to_num(0.25 * reach * np.abs(high - low))
+        return np.asarray(_shaded(self, 1.5 * clear_of(blur)))
+
+
+@njit(cache=True)
+def _blurs(edges: Edges, parts: int) -> Array:
+    bounds = np.linspace(0, edges.low.size, parts + 1)
+    low = (edges.outer_low - edges.inner) / edges.slope_low
+    high = (edges.outer_high - edges.inner) / edges.slope_high
+    out = np.empty(parts)
+    for k in range(parts):
+        part = slice(int(bounds[k]), int(bounds[k + 1]))
+        rise = _median(np.concatenate((low[part], high[part])))
+        variance = (rise / _ROOT_2PI) ** 2 - _SLOPE_VARIANCE
+        out[k] = np.sqrt(max(variance, 0.01))
+    return out
+
+
+@njit(cache=True)
+def _alike(width: Array, least: float) -> NDArray[np.bool_]:
+    """Whether widths are within 5 deviations of the median, or `least`."""
+    away = np.abs(width - _median(width))
+    return np.asarray(away < max(5.0 * 1.4826 * _median(away), least))
+
+
+@njit(cache=True)
+def _wander(low: Array, high: Array, lag: int) -> float:
+    jumps = np.concatenate((low[lag:] - low[:-lag], high[lag:] - high[:-lag]))
+    jump = _median(np.abs(jumps))
+    return 1.05 * jump if jump > 0.0 else 0.0
+
+
+@njit(cache=True)
+def _shaded(edges: Edges, reach: float) -> Array:
+    low = edges.shade_low / edges.slope_low
+    high = edges.shade_high / edges.slope_high
+    return np.nan_to_num(0.25 * reach * np.abs(high - low))
 
 
 def find_edges(
@@ -139,7 +160,7 @@ def find_edges(
     high: Array,
     *,
     reach: float,
-    blur: float,
+    blur: float | Array,
     fuzz: float = 0.0,
     sign: float = 1.0,
     smooth: int = 6,
@@ -156,8 +177,9 @@ def find_edges(
         Expected offsets of the edges, in px.
     reach : float
         How far from there to look, in px.
-    blur : float
-        Standard deviation of the blur, in px: the levels are taken clear of it.
+    blur : float or ndarray, shape (k,)
+        Standard deviation of the blur, in px, of each of so many equal parts: the
+        levels are taken clear of it.
     fuzz : float
         How far hairs and burrs reach, in px: the levels are taken clear of these too.
     sign : float
@@ -170,25 +192,11 @@ def find_edges(
     Edges
         NaN where no edge was found.
     """
-    half = 0.5 * (median(high) - median(low))
-    close, gap, window = level_spans(blur, fuzz)
-    gaps = close, gap
-    span = max(reach + 1.0, gaps[1] + window)
-    # Samples lie a quarter of a pixel and more to either side of the expected edge; a
-    # profile reaches no further in than the axis.
-    before = max(int(min(span, half) / STEP_PX + 0.5), 2)
-    strip = np.empty((len(points), before + int(span / STEP_PX) + 1), np.float32)
-    filters = _level_filters(strip.shape[1], before, gaps, window, blur)
-    out = np.empty((2, 7, len(points)))
-    for side, (outwards, edge) in enumerate(((-1.0, low), (1.0, high))):
-        _sample(grey, points, normals, edge, outwards, before, np.float32(sign), strip)
-        _measure_side(strip, before, filters, smooth, reach, blur, out[side])
-        out[side, 0] += outwards * edge
-    # Levels close to the edges know the shade and so the middle; those clear of the
-    # blur, whose shape is not quite a Gaussian's, know the width, on a side without
-    # shade.
-    growth = (out[0, 5] + out[1, 5]) / (out[0, 6] + out[1, 6])
-    out[:, 0] += np.where(np.abs(growth) < 0.5, growth, 0.0)
+    edge = np.stack([low, high])
+    blurs = np.atleast_1d(np.asarray(blur, dtype=np.float64))
+    out = _both_sides(
+        grey, points, normals, edge, float(reach), blurs, float(fuzz), sign, smooth
+    )
     return Edges(
         low=-out[0, 0], high=out[1, 0], slope_low=out[0, 1], slope_high=out[1, 1],
         inner=0.5 * (out[0, 2] + out[1, 2]), outer_low=out[0, 3], outer_high=out[1, 3],
@@ -196,27 +204,52 @@ def find_edges(
     )  # fmt: skip
 
 
-def joined(parts: Sequence[Edges]) -> Edges:
-    """Return edges along a rod whose parts were sought each by itself."""
-    return Edges(
-        **{
-            field.name: np.concatenate([getattr(part, field.name) for part in parts])
-            for field in fields(Edges)
-        }
-    )
+@njit(cache=True)
+def _both_sides(
+    grey: Image, points: Array, normals: Array, edge: Array, reach: float,
+    blurs: Array, fuzz: float, sign: float, smooth: int,
+) -> Array:  # fmt: skip
+    """Return what `_measure_side` finds on each side, the edge outwards, (2, 7, n)."""
+    out = np.empty((2, 7, len(points)))
+    bounds = np.linspace(0, len(points), blurs.size + 1)
+    for k in range(blurs.size):
+        part, blur = slice(int(bounds[k]), int(bounds[k + 1])), blurs[k]
+        half = 0.5 * (_median(edge[1, part]) - _median(edge[0, part]))
+        close, gap, window = level_spans(blur, fuzz)
+        span = max(reach + 1.0, gap + window)
+        # Samples lie a quarter of a pixel and more to either side of the expected edge;
+        # a profile reaches no further in than the axis.
+        before = max(int(min(span, half) / STEP_PX + 0.5), 2)
+        strip = np.empty(
+            (len(points[part]), before + int(span / STEP_PX) + 1), np.float32
+        )
+        filters = _level_filters(strip.shape[1], before, (close, gap), window, blur)
+        for side in range(2):
+            outwards, along = 2.0 * side - 1.0, edge[side, part]
+            _sample(
+                grey, points[part], normals[part], along, outwards, before,
+                np.float32(sign), strip,
+            )  # fmt: skip
+            found = out[side, :, part]
+            _measure_side(strip, before, filters, smooth, reach, blur, found)
+            found[0] += outwards * along
+    # Levels close to the edges know the shade and so the middle; those clear of the
+    # blur, whose shape is not quite a Gaussian's, know the width, on a side without
+    # shade.
+    growth = (out[0, 5] + out[1, 5]) / (out[0, 6] + out[1, 6])
+    growth = np.where(np.abs(growth) < 0.5, growth, 0.0)
+    out[0, 0] += growth
+    out[1, 0] += growth
+    return out
 
 
-def slices(count: int, parts: int) -> list[slice]:
-    """Return equal parts of a number of stations."""
-    bounds = np.linspace(0, count, parts + 1).astype(int)
-    return [slice(*ends) for ends in pairwise(bounds)]
-
-
+@njit(cache=True)
 def clear_of(blur: float) -> float:
     """Return how far from an edge its blur hardly reaches, px."""
     return max(1.5, 2.2 * blur)
 
 
+@njit(cache=True)
 def level_spans(blur: float, fuzz: float) -> tuple[float, float, float]:
     """Return where levels are taken, px: close to the edge, clear of it; how far on.
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..curve.curve import beside
 from ..curve.robust import median
 from .edges import STEP_PX
 from .flank import median_profiles
@@ -55,8 +56,8 @@ def to_own_width(grey: Image, state: State, seen: Seen, sign: float) -> Seen:
         for one in (bars.high - bars.low, bars.left_slope, bars.right_slope)
     )
     more = 0.5 * (width - seen.edges.width)
-    edges = replace(
-        seen.edges, low=seen.edges.low - more, high=seen.edges.high + more,
+    edges = seen.edges._replace(
+        low=seen.edges.low - more, high=seen.edges.high + more,
         shade_low=-left, shade_high=right,
     )  # fmt: skip
     state.blur, state.blurs, state.width = blur, None, median(edges.width[seen.good])
@@ -68,10 +69,9 @@ def _profiles(
 ) -> tuple[Array, Array]:
     """Return places across, px, and the profiles of pieces about the midline."""
     points, theta = state.curve.at(seen.s)
-    normals = np.column_stack([-np.sin(theta), np.cos(theta)])
     bend = np.interp(seen.s, state.curve.s, state.curve.kappa)
     middle = np.nan_to_num(seen.edges.middle) + 0.5 * state.blur**2 * bend
-    points = points + middle[:, None] * normals
+    points = beside(points, theta, middle)
     reach = 0.5 * state.width + _PAPER * state.blur
     x = np.arange(-reach, reach, max(STEP_PX, 0.2 * state.blur))
     light = sample_lanes(grey, points, theta, x, sign).T.copy()

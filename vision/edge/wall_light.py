@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.jit import njit
-from .edges import level_spans
+from .edges import Edges, level_spans
 from .state import Seen, State
 
 Array = NDArray[np.float64]
@@ -50,19 +50,42 @@ def to_wall_ends(state: State, seen: Seen, walls: Walls) -> Seen:
     """
     places = np.linspace(seen.s[0], seen.s[-1], WALL_PLACES)
     wall, gap = walls(*state.curve.at(places), state.width)
-    edges, width = seen.edges, state.width
-    top, paper, slope = _levels_at(
-        places, wall, 0.5 * width / float(seen.s[1]), edges.inner, edges.outer_low,
-        edges.outer_high, edges.shade_low, edges.shade_high,
+    low, high, wide = _moved(
+        seen.edges, wall, gap, state.width, float(seen.s[1]), state.blur, state.fuzz,
+        MIRRORED, SKY,
     )  # fmt: skip
-    wide, away = np.abs(wall), 2.0 * np.abs(gap) + 0.5 * np.abs(wall)
-    light = wall_light(wide, away, width, top, paper, slope, MIRRORED, SKY)
-    close, _, window = level_spans(state.blur, state.fuzz)
-    short = short_of_end(wide, light, state.blur, close, window)
+    moved = seen.edges._replace(low=low, high=high)
+    return replace(seen, edges=moved, good=moved.usable(wide))
+
+
+@njit(cache=True)
+def _moved(
+    edges: Edges, wall: Array, gap: Array, width: float, step: float, blur: float,
+    fuzz: float, mirrored: float, sky: float,
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    """Return both edges moved to the ends of walls, and how wide the wall is seen."""
+    top, paper, slope = _levels_at(
+        wall, 0.5 * width / step, edges.inner, edges.outer_low, edges.outer_high,
+        edges.shade_low, edges.shade_high,
+    )  # fmt: skip
+    away = 2.0 * np.abs(gap) + 0.5 * np.abs(wall)
+    light = wall_light(np.abs(wall), away, width, top, paper, slope, mirrored, sky)
+    close, _, window = level_spans(blur, fuzz)
+    short = short_of_end(np.abs(wall), light, blur, close, window)
     low, high = edges.low.copy(), edges.high.copy()
-    at = _move(wall, short, low, high)
-    moved = replace(edges, low=low, high=high)
-    return replace(seen, edges=moved, good=moved.usable(at))
+    wide = np.empty(low.size)
+    step = (wall.size - 1) / (low.size - 1)
+    for k in range(low.size):
+        i = min(int(k * step), wall.size - 2)
+        part = k * step - i
+        at = (1.0 - part) * wall[i] + part * wall[i + 1]
+        by = (1.0 - part) * short[i] + part * short[i + 1]
+        if at > 0.0:
+            low[k] -= by
+        else:
+            high[k] += by
+        wide[k] = abs(at)
+    return low, high, wide
 
 
 @njit(cache=True)
@@ -114,17 +137,17 @@ def reflectance(steep: Array) -> Array:
 
 @njit(cache=True)
 def _levels_at(
-    places: Array, wall: Array, half: float, inner: Array, outer_low: Array,
+    wall: Array, half: float, inner: Array, outer_low: Array,
     outer_high: Array, shade_low: Array, shade_high: Array,
 ) -> Array:  # fmt: skip
     """Return means of rod, paper and shade beside the wall that is seen, (3, n).
 
-    Over `half` a number of stations to either side of places, which are spread evenly
-    over all stations.
+    Over `half` a number of stations to either side of each wall, which are spread
+    evenly over all stations.
     """
-    out = np.empty((3, places.size))
-    step = (inner.size - 1) / (places.size - 1)
-    for i in range(places.size):
+    out = np.empty((3, wall.size))
+    step = (inner.size - 1) / (wall.size - 1)
+    for i in range(wall.size):
         paper = outer_low if wall[i] > 0.0 else outer_high
         shade = shade_low if wall[i] > 0.0 else shade_high
         low = max(int(i * step - half), 0)
@@ -138,24 +161,6 @@ def _levels_at(
         scale = 1.0 / count if count else np.nan
         out[0, i], out[1, i], out[2, i] = scale * a, scale * b, scale * c
     return out
-
-
-@njit(cache=True)
-def _move(wall: Array, short: Array, low: Array, high: Array) -> Array:
-    """Move the edges, and return how wide the wall is seen at each."""
-    wide = np.empty(low.size)
-    step = (wall.size - 1) / (low.size - 1)
-    for k in range(low.size):
-        i = min(int(k * step), wall.size - 2)
-        part = k * step - i
-        at = (1.0 - part) * wall[i] + part * wall[i + 1]
-        by = (1.0 - part) * short[i] + part * short[i + 1]
-        if at > 0.0:
-            low[k] -= by
-        else:
-            high[k] += by
-        wide[k] = abs(at)
-    return wide
 
 
 @njit(cache=True)

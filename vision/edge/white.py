@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..curve.curve import beside, normals_of
 from .edges import STEP_PX, _sample
 from .flank import WHITE, Flanks, fit_flanks, is_held, median_profiles
 from .state import Seen, State
@@ -55,7 +56,7 @@ def to_whole_edges(
     state.blur, state.blurs = state.flanks.blur, None
     middles = _means(seen.s, bounds)
     low, high = (np.interp(seen.s, middles, sign * by) for by in state.flanks.moves(2))
-    moved = replace(seen.edges, low=seen.edges.low - low, high=seen.edges.high + high)
+    moved = seen.edges._replace(low=seen.edges.low - low, high=seen.edges.high + high)
     return replace(seen, edges=moved)
 
 
@@ -88,9 +89,9 @@ def _sides(
     """
     curve, edges = state.curve, seen.edges
     points, theta = curve.at(seen.s)
-    normals = np.column_stack([-np.sin(theta), np.cos(theta)])
     bend = np.interp(seen.s, curve.s, curve.kappa)
-    points += (0.5 * state.blur**2 * bend)[:, None] * normals
+    points = beside(points, theta, 0.5 * state.blur**2 * bend)
+    normals = normals_of(theta)
     reach = 4.0 * max(state.blur, 0.6) + 1.0
     before = int(min(reach, 0.45 * state.width) / STEP_PX)
     strip = np.empty((len(points), before + int(reach / STEP_PX)), np.float32)

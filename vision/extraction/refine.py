@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.jit import njit
-from ..curve.curve import Curve
+from ..curve.curve import Curve, beside, normals_of, points_at
 from ..curve.fit import CurveFit, solve
 from ..curve.joints import find_joints
 from ..curve.moment import weighed_fit
 from ..curve.problem import SHARED, pose
-from ..curve.robust import median
+from ..curve.robust import _median, median
 from ..curve.spline import Smooth
 from ..edge.clamp import ClampLines
-from ..edge.edges import Edges, find_edges, joined, slices
+from ..edge.edges import find_edges
 from ..edge.ends import find_ends
 from ..edge.own_width import to_own_width
 from ..edge.state import LostError, Root, Seen, State
@@ -204,7 +204,9 @@ def refine(
             clamped=root == "clamp",
         )  # fmt: skip
         at = fit.curve.s + first
-        width, sigma_width = _smooth_width(seen, at, state.width)
+        width, sigma_width = _smooth_width(
+            seen.s, seen.edges.width, seen.good, at, state.width
+        )
         shaded = np.interp(at, seen.s, seen.edges.shaded(state.blur))
         state.curve, state.half = fit.curve, 0.5 * width
         state.first, state.last = 0.0, float(fit.curve.s[-1])
@@ -242,27 +244,18 @@ def _look(grey: Image, state: State, sign: float, turn: int, *, seeking: bool) -
     """Find the edges along the curve; know its width, blur and roughness after."""
     width = state.width
     step = 2.0 if seeking else 1.0
-    s = np.linspace(0.0, state.curve.s[-1], int(state.curve.s[-1] / step) + 1)
-    points, theta = state.curve.at(s)
-    normals = np.column_stack([-np.sin(theta), np.cos(theta)])
-    half = np.interp(s, state.curve.s, state.half)
-    # Where the blur, of variance v, moves edges of curvature k: by k v / 2.
-    bend = np.interp(s, state.curve.s, state.curve.kappa)
-    points += (0.5 * state.blur**2 * bend)[:, None] * normals
+    s, points, theta, half = _stations(state.curve, state.half, step, state.blur)
     # At first the edges lie where they are expected to a pixel or two.
     reach, fuzz = min(0.35 * width, 6.0 + 0.1 * width), min(0.1 * width, 3.0)
     if turn:
         fuzz = 4.0 * state.scatter
         reach = min(max(3.0, 3.0 * state.blur, 3.0 * fuzz), 0.45 * width)
     state.fuzz = fuzz
-    blurs = np.array([state.blur]) if state.blurs is None else state.blurs
-    edges = joined([
-        find_edges(
-            grey, points[part], normals[part], -half[part], half[part], reach=reach,
-            blur=blur, fuzz=fuzz, sign=sign, smooth=int(6.0 / step),
-        )
-        for part, blur in zip(slices(len(s), len(blurs)), blurs, strict=True)
-    ])  # fmt: skip
+    edges = find_edges(
+        grey, points, normals_of(theta), -half, half, reach=reach,
+        blur=state.blur if state.blurs is None else state.blurs, fuzz=fuzz, sign=sign,
+        smooth=int(6.0 / step),
+    )  # fmt: skip
     good = edges.usable(least=FLARED * width if state.rough else 0.6)
     bare = ~covered(points, state.hidden)
     good &= bare
@@ -278,8 +271,22 @@ def _look(grey: Image, state: State, sign: float, turn: int, *, seeking: bool) -
     if (turn == 1 or state.blurs is not None) and not state.rough:
         local = np.clip(edges.blurs(_BLUR_PARTS), 0.3, 0.5 * state.width)
         state.blurs = local if np.ptp(local) > _UNEVEN * state.blur else None
-    state.scatter = _scatter(edges, int(5.0 / step))
+    state.scatter = edges.wander(int(5.0 / step))
     return Seen(s, theta, edges, good)
+
+
+@njit(cache=True)
+def _stations(
+    curve: Curve, half: Array, step: float, blur: float
+) -> tuple[Array, Array, Array, Array]:
+    """Return arc lengths along a curve, points and angles there, and half widths.
+
+    Where the blur, of variance v, moves edges of curvature k, the points move: k v / 2.
+    """
+    s = np.linspace(0.0, curve.s[-1], int(curve.s[-1] / step) + 1)
+    points, theta = points_at(curve, s)
+    aside = 0.5 * blur**2 * np.interp(s, curve.s, curve.kappa)
+    return s, beside(points, theta, aside), theta, np.interp(s, curve.s, half)
 
 
 def covered(points: Array, places: Array | None) -> NDArray[np.bool_]:
@@ -288,15 +295,6 @@ def covered(points: Array, places: Array | None) -> NDArray[np.bool_]:
     for x, y, radius in () if places is None else places:
         inside |= np.hypot(points[:, 0] - x, points[:, 1] - y) < radius
     return inside
-
-
-def _scatter(edges: Edges, lag: int) -> float:
-    """Return how much an edge jumps from one station to one about 5 px on, px."""
-    low, high = edges.low, edges.high
-    jump = median(
-        np.abs(np.concatenate([low[lag:] - low[:-lag], high[lag:] - high[:-lag]]))
-    )
-    return 1.05 * jump if jump > 0.0 else 0.0
 
 
 def _fit(
@@ -317,13 +315,8 @@ def _fit(
     use = seen.good & (seen.s > first + root) & (seen.s < last - clear)
     if use.sum() < 8:
         raise LostError("edges_lost", "too few edges of the rod are seen")
-    count = max(int((last - first) / max(_BIN_PX, (last - first) / _BINS)), 16)
-    s = np.linspace(first, last, count + 1)
-    offset, within, weights = np.zeros((3, count + 1))
-    _average(seen.s, seen.edges.middle, use, s, offset, within, weights)
-    points, theta = state.curve.at(s)
-    measured = points + offset[:, None] * np.column_stack(
-        [-np.sin(theta), np.cos(theta)]
+    s, theta, measured, offset, within, weights = _binned(
+        state.curve, seen.s, seen.edges.middle, use, first, last
     )
     # Supple while the rod is sought, then stiff enough not to follow shade; the path
     # of a rough rod (yarn) is no elastica, and stays supple.
@@ -367,29 +360,35 @@ def _fit(
 
 
 @njit(cache=True)
-def _average(
-    s: Array, value: Array, use: NDArray[np.bool_], at: Array,
-    mean: Array, within: Array, count: Array,
-) -> None:  # fmt: skip
-    """Average values over the bins about the points of an even grid.
+def _binned(
+    curve: Curve, s: Array, middle: Array, use: NDArray[np.bool_], first: float,
+    last: float,
+) -> tuple[Array, Array, Array, Array, Array, Array]:  # fmt: skip
+    """Return a midline averaged over bins about the points of an even grid.
 
-    `within` becomes the sum of squares about the mean, `count` the number of values.
+    That is arc lengths and angles of the curve there, and of the midline the points,
+    their offsets from it, the sums of squares about these, and the numbers of stations.
     """
-    step = at[1] - at[0]
+    bins = max(int((last - first) / max(_BIN_PX, (last - first) / _BINS)), 16)
+    at = np.linspace(first, last, bins + 1)
+    points, theta = points_at(curve, at)
+    mean, within, count = np.zeros((3, at.size))
     for i in range(s.size):
-        k = int((s[i] - at[0]) / step + 0.5)
+        k = int((s[i] - at[0]) / (at[1] - at[0]) + 0.5)
         if use[i] and s[i] >= at[0] and k < at.size:
             count[k] += 1.0
-            change = value[i] - mean[k]
+            change = middle[i] - mean[k]
             mean[k] += change / count[k]
-            within[k] += change * (value[i] - mean[k])
+            within[k] += change * (middle[i] - mean[k])
+    return at, theta, beside(points, theta, mean), mean, within, count
 
 
+@njit(cache=True)
 def _held_ends(weights: Array, s: Array, width: float) -> Array:
     """Return weights by which a frayed end keeps a little of the shape it had."""
     seen = np.flatnonzero(weights)
     held = weights.copy()
-    little = 0.03 * weights.max()
+    little = 0.03 * np.max(weights)
     if s[-1] - s[seen[-1]] > 0.6 * width:
         held[seen[-1] + 1 :] = little
     if s[seen[0]] - s[0] > 0.6 * width:
@@ -397,16 +396,18 @@ def _held_ends(weights: Array, s: Array, width: float) -> Array:
     return held
 
 
-def _smooth_width(seen: Seen, at: Array, typical: float) -> tuple[Array, Array]:
+@njit(cache=True)
+def _smooth_width(
+    s: Array, width: Array, good: NDArray[np.bool_], at: Array, typical: float
+) -> tuple[Array, Array]:
     """Return the width as a running mean over one rod width, and its deviation."""
-    s, good, width = seen.s, seen.good, seen.edges.width
     half = max(2, int(0.5 * typical / s[1]))
     window = np.ones(2 * half + 1)
     total = np.convolve(np.where(good, width, 0.0), window)[half:-half]
-    count = np.convolve(good.astype(np.float64), window)[half:-half]
-    known = count >= 0.3 * len(window)
+    count = np.convolve(np.where(good, 1.0, 0.0), window)[half:-half]
+    known = count >= 0.3 * window.size
     mean = np.interp(s, s[known], total[known] / count[known])
     # From means that share no station: neighbours share samples and levels.
-    jump = median(np.abs(mean[len(window) :] - mean[: -len(window)]))
-    sigma = 1.05 * jump * np.sqrt(len(window) / np.maximum(count, 1.0))
+    jump = _median(np.abs(mean[window.size :] - mean[: -window.size]))
+    sigma = 1.05 * jump * np.sqrt(window.size / np.maximum(count, 1.0))
     return np.interp(at, s, mean), np.interp(at, s, sigma)
