@@ -19,7 +19,7 @@ def arc(length: float, turn: float, step: float = 1.0) -> tuple[np.ndarray, np.n
 
 
 def test_basis_is_that_of_scipy():
-    knots = knots_between(0.0, 100.0, 7.0, [30.0, 60.0])
+    knots = knots_between(0.0, 100.0, 7.0, np.array([30.0, 60.0]))
     s = np.linspace(0.0, 100.0, 333)
     basis = design(knots, s)
     coefficients = np.random.default_rng(0).normal(size=len(knots) - 4)
@@ -32,7 +32,7 @@ def test_basis_is_that_of_scipy():
 
 
 def test_penalty_is_the_integral_of_the_third_derivative_squared():
-    knots = knots_between(0.0, 50.0, 5.0, [])
+    knots = knots_between(0.0, 50.0, 5.0, np.empty(0))
     rng = np.random.default_rng(1)
     c = rng.normal(size=len(knots) - 4)
     middle = 0.5 * (knots[3:-4] + knots[4:-3])

@@ -37,7 +37,7 @@ COMPLIANCE = np.select([FINE < 200.0, FINE < 400.0], [1.0, 1.4], 0.7)
 
 
 def test_a_straight_moment_over_jumping_stiffness_costs_nothing():
-    knots = knots_between(0.0, 600.0, 30.0, JOINTS)
+    knots = knots_between(0.0, 600.0, 30.0, np.array(JOINTS))
     smooth = Smooth(2, (1.4, 0.5))
     penalty, nullity = penalty_on_moment(knots, smooth, FINE, FINE / 300.0)
     target = COMPLIANCE * (1.0 - FINE / 900.0)
@@ -64,7 +64,7 @@ def elastica(force, kappa_root, compliance=COMPLIANCE):
 @pytest.mark.parametrize("force", [(2e-5, 0.0), (0.0, -6e-6), (1e-5, 5e-6)])
 def test_the_moment_of_one_force_costs_next_to_nothing(force):
     theta, kappa = elastica(force, 5e-3)
-    knots = knots_between(0.0, 600.0, 10.0, JOINTS)
+    knots = knots_between(0.0, 600.0, 10.0, np.array(JOINTS))
     penalty, nullity = penalty_on_moment(knots, Smooth(1, (1.4, 0.5)), FINE, theta)
     assert nullity == 4 + len(JOINTS)
     power = np.linalg.eigvalsh(penalty)
@@ -77,7 +77,7 @@ def test_the_moment_of_one_force_costs_next_to_nothing(force):
 
 
 def test_a_straight_rod_bears_forces_across_it_only():
-    knots = knots_between(0.0, 600.0, 30.0, ())
+    knots = knots_between(0.0, 600.0, 30.0, np.empty(0))
     penalty, _ = penalty_on_moment(knots, Smooth(1), FINE, np.zeros(len(FINE)))
     rows = derivative(knots, FINE)
     straight = np.linalg.lstsq(rows, 1.0 - FINE / 900.0, rcond=None)[0]

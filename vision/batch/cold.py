@@ -16,7 +16,7 @@ from typing import TypeVar
 import numpy as np
 
 from ...core.jit import Kernel, once
-from ..curve.fit import _solution
+from ..curve.fit import solution
 from ..curve.joints import _evidence, _model
 from ..curve.likelihood import penalised
 from ..curve.spline import penalty_between
@@ -43,7 +43,7 @@ PATIENCE = 5_000_000
 """Calls of kernels that a photograph may take in plain Python: some ten seconds."""
 
 _LATEST: tuple[Kernel, ...] = (
-    _solution, _evidence, _model, penalised, penalty_between, _measure_side, _sample,
+    solution, _evidence, _model, penalised, penalty_between, _measure_side, _sample,
     _rough_edges, _fit_line, _fit_step, _half_widths, resample,
 )  # fmt: skip
 """Kernels of every part of a measurement, the slowest to compile among them."""

@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -213,11 +214,28 @@ def solve(
         Whether it is the last step; before that, any fair weight will do.
     """
     ratios = np.array(smooth.ratios or (), dtype=np.float64)
-    shape, numbers, change, covariance, lever = _solution(
-        problem, smooth.order, ratios, strength, last
-    )
-    points, theta, kappa, residual = shape
-    noise, correlation, freedom = numbers
+    return fit_of(problem, solution(problem, smooth.order, ratios, strength, last))
+
+
+class Solved(NamedTuple):
+    """A fit's arrays and numbers, named as in `CurveFit`, its curve in three parts."""
+
+    points: Array
+    theta: Array
+    kappa: Array
+    residual: Array
+    noise: float
+    correlation: float
+    freedom: float
+    change: Array
+    covariance: Array
+    lever: Array
+
+
+def fit_of(problem: Problem, solved: Solved) -> CurveFit:
+    """Return the fit that solves a problem."""
+    points, theta, kappa, residual, noise, correlation, freedom, *rest = solved
+    change, covariance, lever = rest
     return CurveFit(
         curve=Curve(s=problem.s, points=points, theta=theta, kappa=kappa),
         residual=residual, noise=noise, correlation=correlation, freedom=freedom,
@@ -231,15 +249,10 @@ def _chord_angles(points: Array) -> Array:
 
 
 @njit(cache=True)
-def _solution(
+def solution(
     problem: Problem, order: int, ratios: Array, strength: float, last: bool
-) -> tuple[
-    tuple[Array, Array, Array, Array], tuple[float, float, float], Array, Array, Array
-]:
-    """Return what `moved` does, noise, correlation and freedom, and a fit's arrays.
-
-    These are the parameters, their covariance, and the lever.
-    """
+) -> Solved:
+    """Return what `solve` does, as kernels take it."""
     penalty, nullity = penalty_between(
         problem.knots, order, ratios, problem.s, problem.theta
     )
@@ -253,14 +266,17 @@ def _solution(
     covariance = squared(inverse(half))
     freedom = len(normal) - strength * np.sum(penalty * covariance[1:, 1:])
     change = solved(half, right)
-    shape = moved(problem, change)
-    noise, correlation = _scatter(problem, shape[3], freedom)
+    points, theta, kappa, residual = moved(problem, change)
+    noise, correlation = _scatter(problem, residual, freedom)
     turn, basis = np.zeros(len(covariance)), problem.basis
     for j in range(4):
         turn += basis.value[0, j] * covariance[basis.first[0] + 1 + j]
     lever = np.sum(problem.jacobian * turn, axis=1) * problem.weight / problem.shared
     covariance *= noise**2 * correlation / problem.shared
-    return shape, (noise, correlation, freedom), change, covariance, lever
+    return Solved(
+        points, theta, kappa, residual, noise, correlation, freedom, change, covariance,
+        lever,
+    )  # fmt: skip
 
 
 @njit(cache=True)

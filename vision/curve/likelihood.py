@@ -53,28 +53,26 @@ def penalised(
     # The median, because ties at joints are far stiffer than the rest.
     data = np.trace(normal)
     scale = data / ((size - 1) * np.median(np.diag(penalty)))
-    pull = np.zeros(size)
-    pull[1:] = penalty @ coefficients
+    stiff, pull = np.zeros((size, size)), np.zeros(size)
+    stiff[1:, 1:], pull[1:] = penalty, penalty @ coefficients
     stored = np.sum(coefficients * pull[1:])
-    normal = normal.copy()
     # Parts of the rod without data must not make the matrix singular.
+    normal = normal + 1e-9 * scale * stiff
     for j in range(size):
         normal[j, j] += 1e-11 * data / size
-    normal[1:, 1:] += 1e-9 * scale * penalty
     if np.isnan(strength):
         strength = _FAIR * scale
         if last:
             strength = _most_likely(
-                scale, normal, penalty, right, pull, total, stored,
+                scale, normal, stiff, right, pull, total, stored,
                 max(count - free, 1.0), size - free,
             )  # fmt: skip
-    normal[1:, 1:] += strength * penalty
-    return strength, normal, right - strength * pull
+    return strength, normal + strength * stiff, right - strength * pull
 
 
 @njit(cache=True)
 def _most_likely(
-    scale: float, normal: Array, penalty: Array, right: Array, pull: Array,
+    scale: float, normal: Array, stiff: Array, right: Array, pull: Array,
     total: float, stored: float, count: float, rank: int,
 ) -> float:  # fmt: skip
     """Return the penalty weight of greatest restricted likelihood.
@@ -88,9 +86,7 @@ def _most_likely(
         for k in range(-3, 4) if step == 8 else range(-1, 2, 2):
             power = centre + k * step
             weight = scale * 10.0 ** (0.25 * power)
-            matrix = normal.copy()
-            matrix[1:, 1:] += weight * penalty
-            half = factor(matrix)
+            half = factor(normal + weight * stiff)
             gain = np.sum(solved_half(half, right - weight * pull) ** 2)
             logs = 2.0 * np.sum(np.log(np.diag(half)))
             left = max(total + weight * stored - gain, 1e-12 * total + 1e-30)

@@ -13,17 +13,14 @@ come out too large.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .curve import Curve
-from .fit import CurveFit, solve
+from ...core.jit import njit
+from .fit import CurveFit, Solved, fit_of, solution
 from .problem import Problem, moved
-from .spline import Smooth
 
 Array = NDArray[np.float64]
 
@@ -50,51 +47,57 @@ def weighed_fit(problem: Problem, joints: Sequence[float], count: float) -> Curv
     CurveFit
         Its covariance holds the doubt which prior is right (Hoeting et al. 1999).
     """
-    free = solve(problem, Smooth())
-    fits, nearest = [free], free
-    if joints:
-        ratios = _ratios(free.curve, joints)
-        if any(not 1.0 / _MOST < ratio < _MOST for ratio in ratios):
-            return free
-        nearest = solve(problem, Smooth(2, ratios))
-        fits.append(solve(problem, Smooth(2, _ratios(nearest.curve, joints))))
-    fits.append(solve(problem, Smooth(1, _ratios(nearest.curve, joints))))
-    loss = np.array([_criterion(item, count) for item in fits])
-    loss[0] += _STRONG if joints else 0.0
-    weights = np.exp(-0.5 * (loss - loss.min()))
-    return _mean(fits, weights / weights.sum())
-
-
-def _mean(fits: Sequence[CurveFit], weights: Array) -> CurveFit:
-    """Return the mean of fits to one problem, with their scatter in its covariance."""
-    changes = np.array([fit.change for fit in fits])
-    change = weights @ changes
-    apart = changes - change
-    covariance = (weights * apart.T) @ apart
-    for fit, weight in zip(fits, weights, strict=True):
-        covariance += weight * fit.covariance
-    best = fits[int(np.argmax(weights))]
-    points, theta, kappa, residual = moved(best.problem, change)
-    return replace(
-        best,
-        curve=Curve(s=best.curve.s, points=points, theta=theta, kappa=kappa),
-        residual=residual,
-        change=change,
-        covariance=covariance,
-        lever=weights @ np.array([fit.lever for fit in fits]),
-    )
-
-
-def _criterion(fit: CurveFit, count: float) -> float:
-    """Return the information criterion: misfit, and freedom by which it was bought."""
-    return count * 2.0 * math.log(fit.noise) + math.log(count) * fit.freedom
-
-
-def _ratios(curve: Curve, joints: Sequence[float]) -> tuple[float, ...]:
-    """Return curvature beyond over curvature before each joint."""
-    step = curve.s[1] - curve.s[0]
     places = np.asarray(joints, dtype=np.float64)
-    before = np.interp(places - step, curve.s, curve.kappa)
-    beyond = np.interp(places + step, curve.s, curve.kappa)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return tuple(float(ratio) for ratio in beyond / before)
+    return fit_of(problem, _weighed(problem, places, float(count)))
+
+
+@njit(cache=True)
+def _weighed(problem: Problem, joints: Array, count: float) -> Solved:
+    none = np.empty(0)
+    free: Solved = solution(problem, 2, none, np.nan, True)
+    fits, ratios = [free], none
+    if joints.size > 0:
+        ratios = _ratios(free.kappa, problem.s, joints)
+        if not np.all((ratios > 1.0 / _MOST) & (ratios < _MOST)):
+            return free
+        nearest = solution(problem, 2, ratios, np.nan, True)
+        ratios = _ratios(nearest.kappa, problem.s, joints)
+        fits.append(solution(problem, 2, ratios, np.nan, True))
+    fits.append(solution(problem, 1, ratios, np.nan, True))
+    loss = np.array([_criterion(fit, count) for fit in fits])
+    if joints.size > 0:
+        loss[0] += _STRONG
+    weights = np.exp(-0.5 * (loss - np.min(loss)))
+    return _mean(problem, fits, weights / np.sum(weights))
+
+
+@njit(cache=True)
+def _mean(problem: Problem, fits: list[Solved], weights: Array) -> Solved:
+    """Return the mean of fits to one problem, with their scatter in its covariance."""
+    best, change = fits[np.argmax(weights)], np.zeros_like(fits[0].change)
+    covariance, lever = np.zeros_like(best.covariance), np.zeros_like(best.lever)
+    for k in range(weights.size):
+        change += weights[k] * fits[k].change
+        lever += weights[k] * fits[k].lever
+    for k in range(weights.size):
+        apart = fits[k].change - change
+        covariance += weights[k] * (np.outer(apart, apart) + fits[k].covariance)
+    points, theta, kappa, residual = moved(problem, change)
+    return Solved(
+        points, theta, kappa, residual, best.noise, best.correlation, best.freedom,
+        change, covariance, lever,
+    )  # fmt: skip
+
+
+@njit(cache=True)
+def _criterion(fit: Solved, count: float) -> float:
+    """Return the information criterion: misfit, and freedom by which it was bought."""
+    return float(count * 2.0 * np.log(fit.noise) + np.log(count) * fit.freedom)
+
+
+@njit(cache=True)
+def _ratios(kappa: Array, s: Array, joints: Array) -> Array:
+    """Return curvature beyond over curvature before each joint."""
+    step = s[1] - s[0]
+    beyond = np.interp(joints + step, s, kappa)
+    return beyond / np.interp(joints - step, s, kappa)

@@ -18,12 +18,11 @@ from .cholesky import factor, solved
 from .likelihood import equations
 from .spline import (
     Basis,
-    Smooth,
     add_squares,
     combined,
     design,
     knots_between,
-    penalty_on_moment,
+    penalty_between,
 )
 
 Array = NDArray[np.float64]
@@ -83,40 +82,53 @@ def pose(
     joints: Sequence[float] = (), shared: float = SHARED, within: float = 0.0,
 ) -> Problem:  # fmt: skip
     """Return the problem about a curve with these tangent angles; see `fit_curve`."""
-    theta = np.ascontiguousarray(theta)
-    knots = knots_between(s[0], s[-1], spacing, joints)
-    basis, middle = design(knots, s), design(knots, 0.5 * (s[1:] + s[:-1]))
-    stiff, _ = penalty_on_moment(knots, Smooth(), s, theta)
-    none, square = np.empty(0), np.empty((0, 0))
-    problem = Problem(
-        s, np.ascontiguousarray(points), weights, float(shared), float(within), knots,
-        basis, middle, theta, none, none, none, square, square, none,
+    places = np.asarray(joints, dtype=np.float64)
+    problem: Problem = _posed(
+        s, np.ascontiguousarray(points), weights, np.ascontiguousarray(theta),
+        float(spacing), places, float(shared), float(within),
     )  # fmt: skip
-    started: Problem = _started(problem, 1e-3 * spacing**5 * stiff)
-    return started
+    return problem
 
 
 @njit(cache=True)
-def _started(problem: Problem, stiff: Array) -> Problem:
-    """Return the problem about a smooth curve of the given angles."""
-    basis, theta = problem.basis, problem.theta
-    normal, right = stiff.copy(), np.zeros(len(stiff))
+def _posed(
+    s: Array, points: Array, weights: Array, theta: Array, spacing: float,
+    joints: Array, shared: float, within: float,
+) -> Problem:  # fmt: skip
+    knots = knots_between(s[0], s[-1], spacing, joints)
+    basis, middle = design(knots, s), design(knots, 0.5 * (s[1:] + s[:-1]))
+    coefficients = _smoothed(knots, basis, s, theta, 1e-3 * spacing**5)
+    origin = np.zeros(2)
+    none, square = np.empty(0), np.empty((0, 0))
+    problem = Problem(
+        s, points, weights, shared, within, knots, basis, middle, theta, origin,
+        coefficients, none, square, square, none,
+    )  # fmt: skip
+    path = _path(problem, origin, coefficients)[0]
+    used = 0
+    for i in range(theta.size):
+        if weights[i] > 0.0:
+            origin += points[i] - path[i]
+            used += 1
+    posed: Problem = linearised(problem, origin / used, coefficients)
+    return posed
+
+
+@njit(cache=True)
+def _smoothed(
+    knots: Array, basis: Basis, s: Array, theta: Array, stiffness: float
+) -> Array:
+    """Return the coefficients of a smooth curve of about the given angles."""
+    normal, _ = penalty_between(knots, 2, np.empty(0), s, theta)
+    normal *= stiffness
+    right = np.zeros(len(normal))
     add_squares(basis.first, basis.value, np.ones(theta.size), normal)
     for j in range(right.size):
         normal[j, j] += 1e-9
     for i in range(theta.size):
         for j in range(4):
             right[basis.first[i] + j] += basis.value[i, j] * theta[i]
-    coefficients = solved(factor(normal), right)
-    origin = np.zeros(2)
-    path = _path(problem, origin, coefficients)[0]
-    used = 0
-    for i in range(theta.size):
-        if problem.weight[i] > 0.0:
-            origin += problem.points[i] - path[i]
-            used += 1
-    started: Problem = linearised(problem, origin / used, coefficients)
-    return started
+    return np.asarray(solved(factor(normal), right))
 
 
 @njit(cache=True)

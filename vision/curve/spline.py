@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -18,20 +16,20 @@ _TIED = 1e3
 """Weight of a kink of the moment at a joint against one smeared over a piece."""
 
 
-def knots_between(
-    first: float, last: float, spacing: float, joints: Sequence[float]
-) -> Array:
+@njit(cache=True)
+def knots_between(first: float, last: float, spacing: float, joints: Array) -> Array:
     """Return evenly spread knots, four at the ends and three at each joint."""
-    inner = [joint for joint in joints if first + spacing < joint < last - spacing]
-    ends = [first, *sorted(inner), last]
-    pieces: list[Array] = [np.full(_DEGREE, first)]
-    for low, high in pairwise(ends):
-        count = max(round((high - low) / spacing), 2)
-        pieces.append(np.linspace(low, high, count + 1)[:-1])
-        if high != last:
-            pieces.append(np.full(_DEGREE - 1, high))
-    pieces.append(np.full(_DEGREE + 1, last))
-    return np.concatenate(pieces)
+    inside = (joints > first + spacing) & (joints < last - spacing)
+    ends = np.concatenate(
+        (np.array([first]), np.sort(joints[inside]), np.array([last]))
+    )
+    knots = np.full(_DEGREE, first)
+    for i in range(ends.size - 1):
+        count = max(int(np.round((ends[i + 1] - ends[i]) / spacing)), 2)
+        piece = np.linspace(ends[i], ends[i + 1], count + 1)[:-1]
+        more = _DEGREE - 1 if i + 2 < ends.size else _DEGREE + 1
+        knots = np.concatenate((knots, piece, np.full(more, ends[i + 1])))
+    return knots
 
 
 class Basis(NamedTuple):
@@ -58,13 +56,13 @@ class Basis(NamedTuple):
         return np.asarray(combined(self.first, self.slope, coefficients))
 
 
+@njit(cache=True)
 def design(knots: Array, s: Array) -> Basis:
     """Return the B-splines at s, which must not fall."""
-    basis = Basis(
-        np.empty(len(s), np.int64), np.empty((len(s), 4)), np.empty((len(s), 4))
-    )
-    _fill_basis(knots, s, *basis)
-    return basis
+    first = np.empty(s.size, np.int64)
+    value, slope = np.empty((s.size, 4)), np.empty((s.size, 4))
+    _fill_basis(knots, s, first, value, slope)
+    return Basis(first, value, slope)
 
 
 @njit(cache=True)
@@ -244,9 +242,7 @@ def _pieces(knots: Array) -> tuple[NDArray[np.int64], Array, Array, Array, Array
     inner = np.empty(3 * low.size)
     for k in range(3):
         inner[k::3] = low + (0.1 + 0.4 * k) * length
-    first = np.empty(inner.size, np.int64)
-    value, slope = np.empty((inner.size, 4)), np.empty((inner.size, 4))
-    _fill_basis(knots, inner, first, value, slope)
+    first, _, slope = design(knots, inner)
     bend, start, end = np.empty((3, low.size, 4))
     for i in range(low.size):
         a, b, c = slope[3 * i], slope[3 * i + 1], slope[3 * i + 2]
