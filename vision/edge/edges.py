@@ -200,7 +200,7 @@ def find_edges(
     return Edges(
         low=-out[0, 0], high=out[1, 0], slope_low=out[0, 1], slope_high=out[1, 1],
         inner=0.5 * (out[0, 2] + out[1, 2]), outer_low=out[0, 3], outer_high=out[1, 3],
-        shade_low=out[0, 4], shade_high=out[1, 4], growth=growth,
+        shade_low=out[0, 4], shade_high=out[1, 4], growth=out[0, 5],
     )  # fmt: skip
 
 
@@ -209,7 +209,7 @@ def _both_sides(
     grey: Image, points: Array, normals: Array, edge: Array, reach: float,
     blurs: Array, fuzz: float, sign: float, smooth: int,
 ) -> Array:  # fmt: skip
-    """Return what `_measure_side` finds on each side, the edge outwards, (2, 7, n)."""
+    """Return what `_measure_side` finds on each side, (2, 7, n); growth is of both."""
     out = np.empty((2, 7, len(points)))
     bounds = np.linspace(0, len(points), blurs.size + 1)
     for k in range(blurs.size):
@@ -237,9 +237,8 @@ def _both_sides(
     # blur, whose shape is not quite a Gaussian's, know the width, on a side without
     # shade.
     growth = (out[0, 5] + out[1, 5]) / (out[0, 6] + out[1, 6])
-    growth = np.where(np.abs(growth) < 0.5, growth, 0.0)
-    out[0, 0] += growth
-    out[1, 0] += growth
+    out[:, 5] = growth
+    out[:, 0] += np.where(np.abs(growth) < 0.5, growth, 0.0)
     return out
 
 
