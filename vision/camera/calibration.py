@@ -12,6 +12,7 @@ OpenCV writes it. Points are undistorted, whole images never, so nothing is resa
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +40,7 @@ class View:
     why_not: str = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class Calibration:
     """A camera and the plane it looks at.
 
@@ -122,7 +123,7 @@ class Calibration:
         """Whether nothing but a scale is known: no lens, no tilt, no height."""
         return self.camera_height_source == NO_PARALLAX
 
-    @property
+    @cached_property
     def camera(self) -> Camera:
         """The numbers that kernels take."""
         return Camera(

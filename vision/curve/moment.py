@@ -68,7 +68,8 @@ def _weighed(problem: Problem, joints: Array, count: float) -> Solved:
     if joints.size > 0:
         loss[0] += _STRONG
     weights = np.exp(-0.5 * (loss - np.min(loss)))
-    return _mean(problem, fits, weights / np.sum(weights))
+    mean: Solved = _mean(problem, fits, weights / np.sum(weights))
+    return mean
 
 
 @njit(cache=True)
@@ -100,4 +101,4 @@ def _ratios(kappa: Array, s: Array, joints: Array) -> Array:
     """Return curvature beyond over curvature before each joint."""
     step = s[1] - s[0]
     beyond = np.interp(joints + step, s, kappa)
-    return beyond / np.interp(joints - step, s, kappa)
+    return np.asarray(beyond / np.interp(joints - step, s, kappa))

@@ -402,12 +402,20 @@ def _smooth_width(
 ) -> tuple[Array, Array]:
     """Return the width as a running mean over one rod width, and its deviation."""
     half = max(2, int(0.5 * typical / s[1]))
-    window = np.ones(2 * half + 1)
-    total = np.convolve(np.where(good, width, 0.0), window)[half:-half]
-    count = np.convolve(np.where(good, 1.0, 0.0), window)[half:-half]
-    known = count >= 0.3 * window.size
+    window = 2 * half + 1
+    total = _window_sums(np.where(good, width, 0.0), half)
+    count = _window_sums(np.where(good, 1.0, 0.0), half)
+    known = count >= 0.3 * window
     mean = np.interp(s, s[known], total[known] / count[known])
     # From means that share no station: neighbours share samples and levels.
-    jump = _median(np.abs(mean[window.size :] - mean[: -window.size]))
-    sigma = 1.05 * jump * np.sqrt(window.size / np.maximum(count, 1.0))
+    jump = _median(np.abs(mean[window:] - mean[:-window]))
+    sigma = 1.05 * jump * np.sqrt(window / np.maximum(count, 1.0))
     return np.interp(at, s, mean), np.interp(at, s, sigma)
+
+
+@njit(cache=True)
+def _window_sums(values: Array, half: int) -> Array:
+    """Return the sum of each value and of `half` neighbours to either side."""
+    sums = np.concatenate((np.zeros(half + 1), np.cumsum(values), np.zeros(half)))
+    sums[sums.size - half :] = sums[sums.size - half - 1]
+    return sums[2 * half + 1 :] - sums[: values.size]
