@@ -216,16 +216,7 @@ def hard(seed: int) -> tuple[SpatialRod, Field, Support]:
     return SpatialRod(sections=sections, density_kg_m3=2500.0), field, support
 
 
-LONG = 6, 8
-
-
-@pytest.mark.parametrize(
-    "seed",
-    [
-        pytest.param(seed, marks=pytest.mark.slow) if seed in LONG else seed
-        for seed in range(12)
-    ],
-)
+@pytest.mark.parametrize("seed", range(12))
 def test_hard_random_rods_agree_within_the_bound(seed: int) -> None:
     bar, field, support = hard(seed)
     found = solve_spatial(bar, field, support=support)
