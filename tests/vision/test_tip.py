@@ -88,6 +88,14 @@ def test_lane_with_a_speck_at_the_end_counts_for_nothing():
     assert fitted(light).s == pytest.approx(0.0, abs=0.01)
 
 
+def test_a_line_that_no_step_fits_is_no_surer_than_the_blur():
+    light = lanes_over(4.0, 0.0)
+    seen = line_through(light, S, ACROSS, np.zeros(len(ACROSS)))
+    found = fit_step(seen, blur=BLUR, inner=10.0, outer=6.0)
+    assert found.s == seen.line.s
+    assert found.sigma >= BLUR
+
+
 @pytest.mark.parametrize("shade", [0.05, 0.1, 0.2])
 def test_a_front_in_shade_that_is_not_straight_is_as_unsure_as_it_is_off(shade):
     light = lanes_over(0.0, 0.0)

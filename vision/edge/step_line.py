@@ -236,7 +236,12 @@ def _fitted(
         light, s, across, line.s, line.skew, wide, inner, outer, own
     )
     if not (abs(place - line.s) < 2.0 * wide and np.any(known != 0.0)):
-        return line, 0.0
+        # No step fits here: what was crossed may be anything as blurred as this.
+        unsure = EndFace(
+            line.s, wide, line.skew, line.scatter, line.found, 0.0, 0.0, line.skew_sd,
+            0.0, 0.0,
+        )  # fmt: skip
+        return unsure, 0.0
     share = known / np.sum(known)
     scatter, sigma, skew_sd, bulge = line.scatter, line.sigma, line.skew_sd, 0.0
     if own:

@@ -22,7 +22,7 @@ from .setting import Setting
 
 Array = NDArray[np.float64]
 
-EDGE_MM = 0.002
+EDGE_MM = 0.001
 """Doubt of where a clamp or a rod ends, or its sides: no edge is sharper."""
 TIP_BLUR = 0.01
 """Doubt of an end, in its blurs."""
