@@ -7,6 +7,7 @@ what is between them.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from itertools import product
 
@@ -88,23 +89,26 @@ def _joined(one: Candidate, other: Candidate, binary: Binary) -> Candidate | Non
     width = min(one.width_px, other.width_px)
     for first, second in ((one, other), (other, one)):
         for back, ahead in product((False, True), (False, True)):
+            points = first.points_px[::-1] if back else first.points_px
+            then = second.points_px[::-1] if ahead else second.points_px
+            if not leads_to(points, then, _FAR * width):
+                continue
             inner = first.reversed() if back else first
             outer = second.reversed() if ahead else second
             if inner.root == "free" and outer.is_held_at_end:
                 continue  # the other way round its root comes first
             far = _FAR if inner.root != "free" else _NEAR
-            if leads_to(inner.points_px, outer.points_px, far * width) and not _is_bare(
-                inner, outer, binary
-            ):
+            gap = math.dist(points[-1], then[0])
+            if gap <= far * width and not _is_bare(inner, outer, binary):
                 return _whole(inner, outer)
     return None
 
 
 def leads_to(points: Array, then: Array, far: float) -> bool:
     """Whether a part begins where another one leads, no farther than that."""
-    gap = then[0] - points[-1]
-    if np.hypot(*gap) > far:
+    if math.dist(points[-1], then[0]) > far:
         return False
+    gap = then[0] - points[-1]
     before = points[-1] - points[-min(_CHORD, len(points))]
     after = then[min(_CHORD, len(then)) - 1] - then[0]
     return bool(

@@ -251,12 +251,12 @@ def _is_shade(one: Candidate, rod: Candidate) -> bool:
 
 def _are_halves(one: Candidate, other: Candidate) -> bool:
     """Whether two things lie so close along each other as halves of one rod do."""
-    if one.points_px is other.points_px or one.lies_on(other):
+    alike = 0.8 < one.length_px / other.length_px < 1.25
+    if not alike or one.points_px is other.points_px or one.lies_on(other):
         return False
     away = np.array([one.away(point) for point in other.points_px])
     close = _HALVES * max(one.width_px, other.width_px)
-    alike = 0.8 < one.length_px / other.length_px < 1.25
-    return alike and bool(np.quantile(away, 0.9) < close)
+    return bool(np.quantile(away, 0.9) < close)
 
 
 def _too_many(rods: list[Candidate], seen: list[Array], sought: Sought) -> LostError:

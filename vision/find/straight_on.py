@@ -90,9 +90,9 @@ def straight_on(sets: LevelSets, light: Array, touching: set[int]) -> Way:
     barred = False
     least = max(_ARM, int(_ARM_PX / sets.step))
     while after[way[-1]]:
-        at = way[-1]
-        if sum(height[part] >= least for part in after[at]) < 2:
-            way.append(_highest(after[at], height))
+        at, later = way[-1], after[way[-1]]
+        if len(later) < 2 or sum(height[part] >= least for part in later) < 2:
+            way.append(_highest(later, height))
             continue
         arms = _ways_from(at, sets, after)
         arm = _straightest(sets, light, way, arms)
@@ -132,7 +132,8 @@ def _tree(sets: LevelSets) -> tuple[list[list[int]], list[int]]:
         before = all_before[part]
         if before >= 0:
             after[before].append(part)
-            height[before] = max(height[before], height[part] + 1)
+            if height[part] >= height[before]:
+                height[before] = height[part] + 1
     return after, height
 
 
