@@ -10,6 +10,7 @@ import pytest
 
 from magbend.vision import as_photo, extract
 from magbend.vision.camera.calibrate import calibrate_known_length
+from magbend.vision.edge.state import LostError
 from magbend.vision.extraction.extract import measure_candidate
 from magbend.vision.extraction.setting import Setting
 from magbend.vision.find.candidate import Candidate
@@ -358,3 +359,15 @@ def test_a_front_that_shade_beside_the_root_leaves_unchecked_is_in_doubt(
     """The rod's own direction was unsure by 4.6 degrees, the front off by 1.4."""
     found = measured(rod=(0.1, 0.1, 0.1), turn_deg=20.0, shade_px=shade_px, deep=0.5)
     assert ("direction_doubtful" in found.flags) == alone
+
+
+def test_a_rod_that_is_found_and_not_measured_is_shown(monkeypatch):
+    def refuse(*_):
+        raise LostError("no_tip", "the free end of the rod shows no edge")
+
+    monkeypatch.setattr("magbend.vision.extraction.extract.measure_candidate", refuse)
+    found = extract(drawn(rod=BLACK, turn_deg=30.0), SCALE)
+    assert "no_tip" in found.flags
+    points, _ = axis(30.0)
+    middle = found.seen_px[0][len(found.seen_px[0]) // 2]
+    assert np.hypot(*(points - middle).T).min() < 0.5 * WIDTH

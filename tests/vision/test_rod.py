@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from magbend.vision.find.binarise import Binary
+from magbend.vision.find.level_sets import LevelSets
 from magbend.vision.find.rod import find_candidates
+from magbend.vision.find.straight_on import straight_on
 
 
 def things(*boxes: tuple[int, int, int, int]) -> np.ndarray:
@@ -79,3 +81,28 @@ def test_line_longer_than_the_rod_that_it_crosses_is_no_rod():
     mask = things(CLAMP, ROD)
     cv2.line(mask, (320, 20), (300, 390), 1, 4)
     assert candidates(mask)[0].width_px == pytest.approx(10.0, abs=2.0)
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3])
+def test_a_wide_bar_that_leaves_the_picture_is_seen_to_leave_it(rows):
+    mask = np.zeros((400 + rows, 600), np.uint8)
+    mask[20:80, 200:400] = 1  # what it grows from
+    mask[80:, 280:320] = 1
+    (bar,) = candidates(mask)
+    assert bar.contacts == 2
+    assert bar.leaves
+
+
+def test_a_web_at_a_root_leads_nowhere():
+    arms, levels = 9, 12
+    count = 1 + arms * levels
+    level = np.append(0, np.tile(np.arange(1, levels + 1), arms))
+    before = np.arange(-1, count - 1)
+    before[1::levels] = 0
+    angle = np.append(0.0, np.repeat(np.linspace(0.0, 3.0, arms), levels))
+    web = LevelSets(
+        part=np.full((4, 4), -1, np.int32), every=1, size=np.ones(count), step=4.0,
+        centres=4.0 * level[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]),
+        level=level, before=before,
+    )  # fmt: skip
+    assert straight_on(web, np.zeros(count), set()).barred

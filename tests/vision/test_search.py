@@ -131,6 +131,17 @@ def test_rods_in_two_clamps_are_refused_and_both_are_drawn():
     assert orange.sum() > 300
 
 
+def test_a_cable_through_the_picture_is_no_rod():
+    x = np.linspace(-30.0, 30.0, 40)
+    y = 9.0 + np.sin(x / 9.0)
+    cable = np.vstack([np.column_stack([x, y]), np.column_stack([x, y + 1.0])[::-1]])
+    found = measured(
+        replace(PLAIN, marks=(Mark(outline_mm=cable, colour=(0.05,) * 3),))
+    )
+    assert found.ok, found.reason
+    assert off(found) < 0.05
+
+
 def test_a_specimen_tells_its_rod_from_another_in_a_clamp():
     other = Block(
         pose=Pose(x_mm=-12.0, y_mm=8.0, angle_deg=0.0), width_mm=5.0, colour=BLACK

@@ -29,6 +29,10 @@ STEP_PX = 0.5
 _SHADE = 0.003
 """Slope of the paper beside a rod, per px and contrast, that is no shade yet."""
 
+_ROUND_PX, _EVEN = 6.0, 2.0
+"""Half width of a light rod, px, across which a lamp's shading is seen; and samples,
+times px^2, by which it is taken for even until they tell."""
+
 _ROOT_2PI = 2.5066282746310002
 
 _SLOPE_VARIANCE = 0.171
@@ -223,7 +227,10 @@ def _both_sides(
         strip = np.empty(
             (len(points[part]), before + int(span / STEP_PX) + 1), np.float32
         )
-        filters = _level_filters(strip.shape[1], before, (close, gap), window, blur)
+        shaded = sign < 0.0 and half > _ROUND_PX
+        filters = _level_filters(
+            strip.shape[1], before, (close, gap), window, blur, shaded
+        )
         for side in range(2):
             outwards, along = 2.0 * side - 1.0, edge[side, part]
             _sample(
@@ -261,26 +268,28 @@ def level_spans(blur: float, fuzz: float) -> tuple[float, float, float]:
 
 @njit(cache=True)
 def _level_filters(
-    columns: int, before: int, gaps: tuple[float, float], window: float, blur: float
-) -> Array:
+    columns: int, before: int, gaps: tuple[float, float], window: float, blur: float,
+    shaded: bool,
+) -> Array:  # fmt: skip
     """Return the weights of both filters, (6, m): near the edge, then clear of it."""
     filters = np.empty((6, columns))
-    filters[:3] = _level_filter(columns, before, gaps[0], window, blur)
-    filters[3:] = _level_filter(columns, before, gaps[1], window, blur)
+    filters[:3] = _level_filter(columns, before, gaps[0], window, blur, shaded)
+    filters[3:] = _level_filter(columns, before, gaps[1], window, blur, shaded)
     return filters
 
 
 @njit(cache=True)
 def _level_filter(
-    columns: int, before: int, gap: float, window: float, blur: float
+    columns: int, before: int, gap: float, window: float, blur: float, shaded: bool
 ) -> Array:
     """Return the weights of samples in inner level, outer level and its slope, (3, m).
 
     Least squares of a step onto a slope, both blurred by a Gaussian, on samples at
     either side, `gap` clear of the edge: so the blurred edge's own tails count neither
-    as rod nor as shade. The outer level is that at the edge.
+    as rod nor as shade. The outer level is that at the edge. Of a `shaded` rod the
+    inner one slopes too, and is that at the edge but for what the blur adds there.
     """
-    design = np.zeros((columns, 3))
+    design = np.zeros((columns, 4 if shaded else 3))
     for k in range(columns):
         t = (k - before + 0.5) * STEP_PX
         if gap <= abs(t) <= gap + window:
@@ -289,12 +298,19 @@ def _level_filter(
             design[k, 0] = 1.0 - outside
             design[k, 1] = outside
             design[k, 2] = t * outside + blur * bell
+            if shaded:
+                design[k, 3] = t * (1.0 - outside) - blur * bell
     normal = design.T @ design
+    if shaded:
+        normal[3, 3] += _EVEN
     if normal[0, 0] < 0.5:
         # Narrower than the blur: the darkest there is, at the axis.
         design[0, 0] += 1.0
         normal = design.T @ design
-    return np.asarray(np.linalg.solve(normal, design.T))
+    weights = np.linalg.solve(normal, design.T)
+    if shaded:
+        weights[0] -= 2.0 * blur / _ROOT_2PI * weights[3]
+    return np.ascontiguousarray(weights[:3])
 
 
 @njit(cache=True)

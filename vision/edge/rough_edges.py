@@ -14,6 +14,10 @@ Image = NDArray[np.float32]
 EDGE_LEVEL, SHADED_LEVEL = 0.27, 0.4
 """Where a rough edge is, from rod to paper, and from rod to shade right beside it."""
 
+LIGHT_LEVEL = 0.88
+"""The same of a light rod on a dark board, at first: a round one that a lamp lights
+from one side is not much lighter than the board on the other."""
+
 _UNEVEN = 3.0
 """Spread of the widths, px, beyond which the edges are looked at again."""
 
@@ -62,6 +66,9 @@ def _rough_edges(
     strip = np.empty((len(points), 2 * half), dtype=np.float32)
     _sample(grey, points, normals, np.zeros(len(points)), 1.0, half, sign, strip)
     dark, paper = _dark_and_paper(strip)
+    if sign < 0.0:
+        low, high, level = _light_edges(strip, half, dark)
+        return low, high, dark, level
     low, high, level = _edges_at(strip, half, dark, dark + EDGE_LEVEL * (paper - dark))
     if _spread(low, high) > _UNEVEN:
         # Perhaps a deep shadow is taken for rod: it changes its width along a rod that
@@ -86,6 +93,49 @@ def _edges_at(
     low, _ = _outermost(strip, half, left)
     _, high = _outermost(strip, half, right)
     return low, high, min(left, right)
+
+
+@njit(cache=True)
+def _light_edges(strip: Image, half: int, dark: float) -> tuple[Array, Array, float]:
+    """Return the edges of a light rod, and the level nearer to the board's light.
+
+    Either side has its own board, since a shade is darker; and its own rod: half way to
+    the light just inside, which is far from the brightest away from the lamp.
+    """
+    middle = np.zeros(len(strip))
+    board = _light_at(strip, half, middle - half), _light_at(strip, half, middle + half)
+    rough = dark + LIGHT_LEVEL * (np.array(board) - dark)
+    low, _ = _nearest(strip, half, rough[0])
+    _, high = _nearest(strip, half, rough[1])
+    left = 0.5 * (board[0] + _light_at(strip, half, low + _BESIDE))
+    right = 0.5 * (board[1] + _light_at(strip, half, high - _BESIDE))
+    low, _ = _nearest(strip, half, left)
+    _, high = _nearest(strip, half, right)
+    return low, high, max(left, right)
+
+
+@njit(cache=True)
+def _nearest(strip: Image, half: int, level: float) -> tuple[Array, Array]:
+    """Return where that part of each profile ends that is beyond a level at its middle.
+
+    From within, since gloss makes no gap in what is light, and a board may have lines.
+    """
+    low, high = np.full(len(strip), np.nan), np.full(len(strip), np.nan)
+    for i in range(len(strip)):
+        profile, middle = strip[i], half
+        for away in range(half):
+            middle = half - away if profile[half - away] < level else half + away
+            if profile[middle] < level:
+                break
+        if not profile[middle] < level:
+            continue
+        first = last = middle
+        while first > 0 and profile[first - 1] < level:
+            first -= 1
+        while last < 2 * half - 1 and profile[last + 1] < level:
+            last += 1
+        low[i], high[i] = (first - half) * STEP_PX, (last + 1 - half) * STEP_PX
+    return low, high
 
 
 @njit(cache=True)

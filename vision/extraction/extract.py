@@ -66,9 +66,9 @@ FAR, WANDER = 0.15, 8.0
 """Blur, in widths, from which edges are sought as blurred from the start, and in jumps
 of the width, which are more on a yarn."""
 
-TOO_FAR, COLLAPSED = 0.5, 0.9
+TOO_FAR, COLLAPSED, ROUGHLY = 0.5, 0.9, 1.0
 """Blur, in widths, in which a width cannot be told from the blur; and width over that
-of the start, below which edges were lost."""
+of the start, below which edges were lost, with how well that is known, px."""
 
 
 def extract(photo: Photo, calibration: Calibration | None, **known: Any) -> Measurement:
@@ -124,7 +124,7 @@ def _measure(photo: Photo, setting: Setting) -> Measurement:
     quick, doubt = None, LostError("no_rod", "nothing stands out from the background")
     try:
         rod, view = find_rod(photo, sought)
-        quick = measure_candidate(photo, setting, rod, view)
+        quick = _measured(photo, setting, rod, view)
         if _is_sure(quick, rod, view) and not shows_another(photo, rod):
             return quick
     except LostError as lost:
@@ -132,7 +132,7 @@ def _measure(photo: Photo, setting: Setting) -> Measurement:
     except BROKEN:
         pass
     try:
-        whole = measure_candidate(photo, setting, *search_rod(photo, sought))
+        whole = _measured(photo, setting, *search_rod(photo, sought))
     except (LostError, *BROKEN) as lost:
         if quick is not None:
             return _doubted(quick)
@@ -140,6 +140,16 @@ def _measure(photo: Photo, setting: Setting) -> Measurement:
             raise
         raise _empty(photo) or doubt from None
     return whole if quick is None else _better(quick, whole)
+
+
+def _measured(
+    photo: Photo, setting: Setting, rod: Candidate, view: View
+) -> Measurement:
+    """Measure what was found; a refusal shows it."""
+    try:
+        return measure_candidate(photo, setting, rod, view)
+    except LostError as lost:
+        raise LostError(lost.flag, lost.reason, [rod.points_px]) from None
 
 
 def _is_sure(quick: Measurement, rod: Candidate, view: View) -> bool:
@@ -332,7 +342,8 @@ def _refined(
     if start.blur > FAR * start.width:
         lost = refined.blur > TOO_FAR * refined.typical_width
     else:
-        lost = not start.rough and refined.typical_width < COLLAPSED * start.width
+        least = COLLAPSED * (start.width - ROUGHLY)
+        lost = not start.rough and refined.typical_width < least
     if lost:
         raise LostError(
             "edges_lost",

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..curve.robust import quantile
 from ..edge.clamp import is_dark_line
 from ..edge.edges import clear_of
+from ..edge.flank import WHITE
 from ..edge.state import LostError
 from ..edge.white import SOME
 from ..find.candidate import Candidate
@@ -171,6 +172,8 @@ def doubts(
     if refined.whole or photo.clipped > 0.01:
         known = refined.whole or refined.saturated <= SOME
         flags.append("clipped" if known else "overexposed")
+    elif _is_white_in_mix(photo, result, refined):
+        flags.append("overexposed")
     if refined.blur > max(BLURRED_PX, BLURRED * result.width_px):
         flags.append("blurred")
     if pull > SHADE_PX:
@@ -198,6 +201,15 @@ def _front_in_shade(refined: Refined, pull: float) -> bool:
     width = refined.typical_width
     smeared = smeared_px(refined, refined.clamp.blur) > SMEARED * width
     return smeared or (pull > SHADE_PX and refined.blur > UNRESOLVED * width)
+
+
+def _is_white_in_mix(photo: Photo, result: Measurement, refined: Refined) -> bool:
+    """Whether a light rod is cut off in a colour that it is measured in."""
+    if not result.inverted or result.mix is None:
+        return False
+    light = photo.colour_at(refined.fit.curve.points[refined.good])
+    white = np.median(np.asarray(light), axis=0) > WHITE
+    return bool(white[np.array(result.mix) > 0.0].any())
 
 
 def _length_is_off(result: Measurement, setting: Setting) -> bool:

@@ -33,6 +33,9 @@ _INSIDE = 0.6
 _QUARTILES = 1.349
 """Distance of the quartiles of a normal distribution, in its standard deviation."""
 
+_BLACK = 0.02
+"""Light that is told from none."""
+
 GRID = 8
 """Lanes and stations a width along what was measured."""
 
@@ -120,9 +123,14 @@ def blur_of(strip: Strip) -> tuple[float, float, float]:
     A step that is blurred by b rises from a quarter to three quarters of its height
     over 1.35 b; of a rod that is hardly wider than its blur, less of both is seen.
     """
+    light = strip.light
+    if median(light[0]) < 0.0:
+        # Of a light rod the lamp makes slopes as well, but all of its light is far from
+        # the board's.
+        light = -np.log(np.maximum(_BLACK - light, _BLACK))
     step = strip.width * (strip.across[1] - strip.across[0])
     first, end = np.searchsorted(strip.across, (-_INSIDE, _INSIDE)).tolist()
-    quarter, half, most = step * _sides(strip.light, first, end)
+    quarter, half, most = step * _sides(light, first, end)
     width, typical = half.sum(axis=0), median(half.sum(axis=0))
     jumps = np.minimum(np.abs(np.diff(width)), 0.5 * typical)
     rises = (most - quarter).min(axis=0)

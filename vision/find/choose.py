@@ -223,12 +223,18 @@ def _standing_out(things: list[Thing], sought: Sought, seen: list[Array]) -> Can
         other.best
         for other in rivals
         if not other.is_shade
+        and (_leaves(rod) or not _leaves(other.best))
         and other.best.length_px > _AS_LONG * rod.length_px
         and not sought.tells(rod, other.best, _HINTED)
     ]
     if alike:
         raise _too_many([rod, *alike], seen, sought)
     return rod
+
+
+def _leaves(thing: Candidate) -> bool:
+    """Whether a thing is held, or goes on, at one end and leaves the picture there."""
+    return thing.contacts > 1 and (thing.leaves or thing.root == "border")
 
 
 def _compare_colours(photo: Photo, colour: str, things: list[Thing]) -> None:
@@ -326,7 +332,10 @@ def _choose(binary: Binary, sought: Sought) -> Candidate:
         rod = _likeliest(rods)
         rod = min([rod, *_alike(rod, rods)], key=sought.misfit)
         others = [
-            other for other in _alike(rod, rods) if not sought.tells(rod, other, _TOLD)
+            other
+            for other in _alike(rod, rods)
+            if (_leaves(rod) or not _leaves(other))
+            and not sought.tells(rod, other, _TOLD)
         ]
         if others:
             seen = [item.points_px for item in [rod, *others][:_SHOWN]]

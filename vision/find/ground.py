@@ -129,8 +129,9 @@ def best_view(photo: Photo, points_px: Array, width_px: float) -> View:
     if contrast[best] < _BETTER * quantile(own.sign * (paper - grey), 0.1):
         return own
     mix = 0.65 * mixes[best] / max(median(step @ mixes[best]), 1e-6)
-    b, g, r = (float(part) for part in mix)
-    return mixed(photo, (b, g, r), 1.0, about(points_px, width_px))
+    sign = -1.0 if np.all(mix <= 0.0) else 1.0
+    b, g, r = (float(part) for part in sign * mix)
+    return mixed(photo, (b, g, r), sign, about(points_px, width_px))
 
 
 def about(points_px: Array, width_px: float) -> Array:

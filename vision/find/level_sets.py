@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import product
 
 import cv2
 import numpy as np
@@ -29,6 +30,8 @@ _FINE_HALF = 8.0
 """Half width, px, that shows all there is to see: of wider things, fewer pixels do."""
 _SLIT = 4.0
 """Half widths between the middles of what a slit parts, at most."""
+_END = 4.0
+"""Steps from a mask to the parts next to it, at most."""
 _REACHED = 0.5
 """Part of a thing that is reached from its root, at least."""
 
@@ -62,9 +65,19 @@ class LevelSets:
     step: float
 
     def parts_at(self, places: Places) -> set[int]:
-        """Return the numbers of the parts at places (row, column) of the thing."""
+        """Return the numbers of the parts at places (row, column) of the thing.
+
+        Of an end so thin that it was taken for a hair, those next to it.
+        """
         flat = _thinned(places, self.every, self.part.shape[1])
-        return set(self.part.ravel()[flat].tolist()) - {-1}
+        found = set(self.part.ravel()[flat].tolist()) - {-1}
+        if not found and len(places):
+            rows, columns = np.nonzero(self.part >= 0)
+            row, column = places.mean(axis=0) / self.every
+            away = np.hypot(rows - row, columns - column)
+            near = away < _END * self.step / self.every
+            found = set(self.part[rows[near], columns[near]].tolist())
+        return found
 
     def where(self, part: int) -> Places:
         """Return the places (row, column) of a part in the thing."""
@@ -108,9 +121,14 @@ def level_sets(piece: Mask, seeds: Places | None, half: float) -> LevelSets | No
 
 
 def _thinned(places: Places, every: int, width: int) -> Places:
-    """Return where places are among every so many rows and columns, as flat indices."""
-    row, column = ((places + every // 2) // every).T
-    return np.asarray(row * width + column)
+    """Return where places are among every so many rows and columns, as flat indices.
+
+    To either side, since a thing may end between one of them and the next.
+    """
+    low, high = places // every, -(-places // every)
+    return np.concatenate(
+        [y[:, 0] * width + x[:, 1] for y, x in product((low, high), repeat=2)]
+    )
 
 
 def _from_root(

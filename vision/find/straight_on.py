@@ -186,7 +186,7 @@ def _straightest(
     """
     recent = np.asarray(way[::-1][1 : _RECENT + 1])
     if len(recent) < 2:
-        return max(arms, key=len)
+        return max(arms, key=len, default=None)
     path, own = sets.centres[recent], median(light[recent])
     best, found = np.inf, None
     for arm in arms:

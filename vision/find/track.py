@@ -35,6 +35,10 @@ _UNSEEN = 8
 _AS_LIGHT = 0.7
 """Light of paper beyond what hid an edge, over that before it; a clamp is darker."""
 
+_LIGHT_ASIDE = 0.9
+"""How far aside the edges of a light rod may be, in its rough width, which may be that
+of the side a lamp lights."""
+
 FLARED = 0.6
 """How much a rough rod may widen or thin, as where its end opens, in widths."""
 ROUGH_PX, ROUGH_WIDTHS = 0.7, 0.03
@@ -92,8 +96,9 @@ def start_curve(
     """
     s, along, theta = resample(points, 0.6 * width)
     normals = np.column_stack([-np.sin(theta), np.cos(theta)])
+    aside = 0.5 if sign > 0.0 else _LIGHT_ASIDE
     low, high, dark, level = rough_edges(
-        grey, along, normals, reach=0.5 * width + 4.0 + 2.0 * blur, sign=sign
+        grey, along, normals, reach=aside * width + 4.0 + 2.0 * blur, sign=sign
     )
     across = high - low
     found = np.isfinite(across) & (across > 1.0)
@@ -207,7 +212,9 @@ def _carry_on(
             sign * _streak(grey, x - beside * v, y + beside * u, u, v),
             sign * _streak(grey, x + beside * v, y - beside * u, u, v),
         )
-        here = min(level, dark + SHADED_LEVEL * (shade - dark))
+        here = level
+        if sign > 0.0:
+            here = min(level, dark + SHADED_LEVEL * (shade - dark))
         low, high = _dark_span(grey, x, y, -v, u, beside + 2.0, sign, here)
         aside = 0.5 * (low + high)
         alike = abs(high - low - width) < 0.2 * width + 0.5
