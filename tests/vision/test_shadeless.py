@@ -140,3 +140,12 @@ def test_beside_a_black_rod_what_is_paler_may_be_its_shade_but_no_coloured_rod()
     assert told(photo, [other, rod]) == [[False, False], [True, False]]
     photo = drawn(BLACK, kept=(1.0, 1.0, 1.0), aside=0.0, other=(RED, bent(45.0)))
     assert told(photo, [other, rod]) == [[False, False], [False, False]]
+
+
+@pytest.mark.parametrize("aside", [26.0, 40.0])
+def test_halves_of_a_rod_are_equally_dark_and_its_shade_is_paler(aside):
+    """Two black things side by side may be one that a streak of gloss parts."""
+    shaded = drawn(BLACK, kept=(0.4,) * 3, aside=aside)
+    assert "other_rod" not in extract(shaded, None, clamp="none").flags
+    parted = drawn(BLACK, kept=(1.0,) * 3, aside=0.0, other=(BLACK, bent(26.0)))
+    assert "other_rod" in extract(parted, None, clamp="none").flags

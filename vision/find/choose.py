@@ -53,6 +53,9 @@ _HALVES = 2.5
 """Distance between the axes of two halves of a rod that a streak of gloss parts, at
 most, in widths of the wider, as far as that is known yet."""
 
+_RIM_PX = 5.0
+"""Width of a half that may be too thin to be seen as dark as it is."""
+
 _SHOWN = 6
 """Things that are drawn on the overlay of a refusal."""
 
@@ -260,6 +263,9 @@ def _are_halves(one: Candidate, other: Candidate) -> bool:
     alike = 0.8 < one.length_px / other.length_px < 1.25
     if not alike or one.points_px is other.points_px or one.lies_on(other):
         return False
+    rim = min(one.width_px, other.width_px) < _RIM_PX
+    if not rim and (_is_shade(one, other) or _is_shade(other, one)):
+        return False  # halves are equally dark, as far as they are resolved
     away = np.array([one.away(point) for point in other.points_px])
     close = _HALVES * max(one.width_px, other.width_px)
     return bool(np.quantile(away, 0.9) < close)
