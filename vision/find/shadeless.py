@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +69,30 @@ _NOISE, _DEPTH = 0.003, 0.1
 """Least noise of the light of a pixel; and what a shade takes of it."""
 
 
+class _Band(NamedTuple):
+    """What has a colour of its own along a candidate, on lanes beside its axis.
+
+    Stations with normals; lanes; light of each colour, (n, m, 3), and of paper; light
+    over the paper's, (n, m), and how much of it is the band's; and of the band the
+    stations that see it, its middle off the axis, and its width, px.
+    """
+
+    points: Array
+    normals: Array
+    across: Array
+    light: Array
+    paper: Array
+    share: Array
+    tint: Array
+    seen: slice
+    middle: Array
+    width: float
+
+    def axis(self) -> Array:
+        """Return points on its midline, where it is seen."""
+        return (self.points + self.middle[:, None] * self.normals)[self.seen]
+
+
 def in_its_colour(photo: Photo, rod: Candidate, view: View) -> tuple[Candidate, View]:
     """Return a coloured rod in the light that tells it, but not its shade.
 
@@ -87,39 +112,20 @@ def in_its_colour(photo: Photo, rod: Candidate, view: View) -> tuple[Candidate, 
     view : View
         Without a shade it is the lightness that the colours have together.
     """
-    if photo.colour_at(rod.points_px[:1]) is None:
+    band = _coloured_band(photo, rod)
+    if band is None:
         return rod, view
-    points, normals, across = _lanes(rod)
-    spots = points[:, None] + across[:, None] * normals[:, None]
-    glance = np.asarray(photo.colour_at(spots[::_FEW, ::2]))
-    paper = np.quantile(glance, _PAPER, axis=(0, 1)).astype(float)
-    if not _tinted(glance / paper).any():
-        return rod, view  # as most rods, at little cost
-    light = np.asarray(photo.colour_at(spots))
-    share = light / paper
-    tint = _tinted(share)
-    band = _nearest_band(tint > 0.5, across)
-    seen = np.flatnonzero(np.isfinite(band[:, 0]))
-    if len(seen) < _ALL_ALONG * len(points):
+    within = float(np.mean(np.abs(band.middle) < 0.5 * band.width)) > _ALL_ALONG
+    if not within and not _is_its_shade(band):
         return rod, view
-    middle = np.interp(np.arange(len(points)), seen, band[seen].mean(axis=1))
-    width = median(np.ptp(band[seen], axis=1))
-    brightness = share.mean(axis=2)
-    within = float(np.mean(np.abs(middle) < 0.5 * width)) > _ALL_ALONG
-    if not within and not _is_its_shade(brightness, middle, width, normals, across):
-        return rod, view
-    away = np.abs(across - middle[:, None]) / width
-    beside = (away > _CLOSE[0]) & (away < _CLOSE[1])
-    whole = within and _AS_WIDE < width / rod.width_px < 1.0 / _AS_WIDE
-    if whole and _is_pale(brightness, tint, beside):
+    whole = within and _AS_WIDE < band.width / rod.width_px < 1.0 / _AS_WIDE
+    if whole and _is_pale(band):
         return rod, in_lightness(photo, rod, view)
-    mix = _discriminant(light, tint, paper)
-    if np.std(light[tint > 0.8] @ mix) > _UNEVEN:
+    mix = _discriminant(band)
+    if np.std(band.light[band.tint > 0.8] @ mix) > _UNEVEN:
         return rod, view
     near = about(rod.points_px, rod.width_px)
-    along = slice(seen[0], seen[-1] + 1)
-    axis = (points + middle[:, None] * normals)[along]
-    rod = replace(rod, points_px=axis, width_px=width)
+    rod = replace(rod, points_px=band.axis(), width_px=band.width)
     return rod, mixed(photo, mix, 1.0, near)
 
 
@@ -198,6 +204,31 @@ def _paper_colour(photo: Photo) -> Array | None:
     return None if colour is None else np.median(colour, axis=(0, 1)).astype(float)
 
 
+def _coloured_band(photo: Photo, rod: Candidate) -> _Band | None:
+    """Return what has a colour of its own along a candidate; None if nothing has."""
+    if photo.colour_at(rod.points_px[:1]) is None:
+        return None
+    points, normals, across = _lanes(rod)
+    spots = points[:, None] + across[:, None] * normals[:, None]
+    glance = np.asarray(photo.colour_at(spots[::_FEW, ::2]))
+    paper = np.quantile(glance, _PAPER, axis=(0, 1)).astype(float)
+    if not _tinted(glance / paper).any():
+        return None  # as along most rods, at little cost
+    light = np.asarray(photo.colour_at(spots))
+    share = light / paper
+    tint = _tinted(share)
+    sides = _nearest_band(tint > 0.5, across)
+    seen = np.flatnonzero(np.isfinite(sides[:, 0]))
+    if len(seen) < _ALL_ALONG * len(points):
+        return None
+    return _Band(
+        points=points, normals=normals, across=across, light=light, paper=paper,
+        share=share.mean(axis=2), tint=tint, seen=slice(seen[0], seen[-1] + 1),
+        middle=np.interp(np.arange(len(points)), seen, sides[seen].mean(axis=1)),
+        width=median(np.ptp(sides[seen], axis=1)),
+    )  # fmt: skip
+
+
 def _lanes(rod: Candidate) -> tuple[Array, Array, Array]:
     """Return points along a rod, their normals, and offsets of lanes beside it."""
     _, points, theta = resample(rod.points_px, 0.6 * rod.width_px)
@@ -219,19 +250,18 @@ def _nearest_band(on: Mask, across: Array) -> Array:
     return band
 
 
-def _is_its_shade(
-    share: Array, middle: Array, width: float, normals: Array, across: Array
-) -> bool:
-    """Whether what lies along an axis may be the shade of a rod beside it.
+def _is_its_shade(band: _Band) -> bool:
+    """Whether what lies along an axis may be the shade of a coloured rod beside it.
 
     A shade is the rod once more, shifted by one vector.
     """
-    inside = np.abs(middle) < 0.5 * width
-    axis = share[:, len(across) // 2]
+    middle, normals, across = band.middle, band.normals, band.across
+    inside = np.abs(middle) < 0.5 * band.width
+    axis = band.share[:, len(across) // 2]
     ridge = len(normals) * _SHIFT**2 * np.eye(2)
     shift = np.linalg.solve(normals.T @ normals + ridge, normals.T @ middle)
     astray = median(np.abs(middle - normals @ shift))
-    near = float(np.hypot(*shift)) < across[-1] and astray < _COPY * width
+    near = float(np.hypot(*shift)) < across[-1] and astray < _COPY * band.width
     return near and median(axis[~inside]) > _DEEPEST
 
 
@@ -251,21 +281,23 @@ def _tinted(share: Array) -> Array:
     return np.asarray(hue @ direction / np.median(hue[strong] @ direction))
 
 
-def _is_pale(share: Array, tint: Array, beside: Mask) -> bool:
+def _is_pale(band: _Band) -> bool:
     """Whether a shade right beside its rod is lighter than half way from that to paper.
 
     Half level is then the rod's own edge, which colours would tell less well: most
     sensors guess two of three at a pixel, JPEG keeps every other pixel's, and a mix of
     them has several times their noise.
     """
-    shade = np.where(beside & (np.abs(tint) < 0.2), share, 1.0).min(axis=1)
-    return bool(np.quantile(shade, _MOST) > 0.5 * (1.0 + median(share[tint > 0.8])))
+    away = np.abs(band.across - band.middle[:, None]) / band.width
+    beside = (away > _CLOSE[0]) & (away < _CLOSE[1]) & (np.abs(band.tint) < 0.2)
+    shade = np.quantile(np.where(beside, band.share, 1.0).min(axis=1), _MOST)
+    return bool(shade > 0.5 * (1.0 + median(band.share[band.tint > 0.8])))
 
 
-def _discriminant(light: Array, tint: Array, paper: Array) -> Mix:
+def _discriminant(band: _Band) -> Mix:
     """Return weights in which the paper is 0.65 lighter than the rod."""
-    rod, ground = light[tint > 0.8], light[np.abs(tint) < 0.2]
-    shade = _DEPTH * paper
+    rod, ground = band.light[band.tint > 0.8], band.light[np.abs(band.tint) < 0.2]
+    shade = _DEPTH * band.paper
     within = np.cov(ground.T) + np.outer(shade, shade) + _NOISE**2 * np.eye(3)
     step = np.median(ground, axis=0) - np.median(rod, axis=0)
     mix = np.linalg.solve(within, step)
