@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
 from magbend.vision.curve.fit import fit_curve
-from magbend.vision.curve.spline import Smooth, design, knots_between, penalty_on_moment
+from magbend.vision.curve.spline import design, knots_between, penalty_between
 
 
 def arc(length: float, turn: float, step: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
@@ -38,7 +38,7 @@ def test_penalty_is_the_integral_of_the_third_derivative_squared():
     middle = 0.5 * (knots[3:-4] + knots[4:-3])
     third = BSpline(knots, c, 3)(middle, nu=3)
     exact = np.sum(third**2 * np.diff(knots[3:-3]))
-    penalty, _ = penalty_on_moment(knots, Smooth(), middle, 0.1 * middle)
+    penalty, _ = penalty_between(knots, 2, np.empty(0), middle, 0.1 * middle)
     assert c @ penalty @ c == pytest.approx(exact, rel=1e-9)
 
 

@@ -9,7 +9,7 @@ from scipy.integrate import cumulative_trapezoid
 from magbend.vision.curve.fit import solve
 from magbend.vision.curve.moment import weighed_fit
 from magbend.vision.curve.problem import pose
-from magbend.vision.curve.spline import Smooth, design, knots_between, penalty_on_moment
+from magbend.vision.curve.spline import Smooth, design, knots_between, penalty_between
 
 JOINTS = (200.0, 400.0)
 S = np.arange(0.0, 601.0, 4.0)
@@ -38,8 +38,8 @@ COMPLIANCE = np.select([FINE < 200.0, FINE < 400.0], [1.0, 1.4], 0.7)
 
 def test_a_straight_moment_over_jumping_stiffness_costs_nothing():
     knots = knots_between(0.0, 600.0, 30.0, np.array(JOINTS))
-    smooth = Smooth(2, (1.4, 0.5))
-    penalty, nullity = penalty_on_moment(knots, smooth, FINE, FINE / 300.0)
+    ratios = np.array([1.4, 0.5])
+    penalty, nullity = penalty_between(knots, 2, ratios, FINE, FINE / 300.0)
     target = COMPLIANCE * (1.0 - FINE / 900.0)
     cost, size = costs(penalty, derivative(knots, FINE), target)
     assert cost == pytest.approx(0.0, abs=1e-9 * size)
@@ -65,7 +65,7 @@ def elastica(force, kappa_root, compliance=COMPLIANCE):
 def test_the_moment_of_one_force_costs_next_to_nothing(force):
     theta, kappa = elastica(force, 5e-3)
     knots = knots_between(0.0, 600.0, 10.0, np.array(JOINTS))
-    penalty, nullity = penalty_on_moment(knots, Smooth(1, (1.4, 0.5)), FINE, theta)
+    penalty, nullity = penalty_between(knots, 1, np.array([1.4, 0.5]), FINE, theta)
     assert nullity == 4 + len(JOINTS)
     power = np.linalg.eigvalsh(penalty)
     assert power[0] > -1e-12 * power[-1]
@@ -78,7 +78,7 @@ def test_the_moment_of_one_force_costs_next_to_nothing(force):
 
 def test_a_straight_rod_bears_forces_across_it_only():
     knots = knots_between(0.0, 600.0, 30.0, np.empty(0))
-    penalty, _ = penalty_on_moment(knots, Smooth(1), FINE, np.zeros(len(FINE)))
+    penalty, _ = penalty_between(knots, 1, np.empty(0), FINE, 0.0 * FINE)
     rows = derivative(knots, FINE)
     straight = np.linalg.lstsq(rows, 1.0 - FINE / 900.0, rcond=None)[0]
     parabola = np.linalg.lstsq(rows, FINE**2, rcond=None)[0]

@@ -7,7 +7,7 @@ import pytest
 
 from magbend.vision.curve.fit import solve
 from magbend.vision.curve.problem import moved, pose
-from magbend.vision.curve.spline import Smooth, penalty_on_moment
+from magbend.vision.curve.spline import Smooth, penalty_between
 
 S = np.arange(0.0, 601.0, 4.0)
 JOINTS = (200.0, 400.0)
@@ -45,9 +45,10 @@ def test_the_step_and_its_deviations_are_those_of_dense_least_squares(problem, s
     rows, data = problem.jacobian, problem.residual
     weight = np.diag(problem.weight / problem.shared)
     penalty = np.zeros((rows.shape[1],) * 2)
-    penalty[1:, 1:], _ = penalty_on_moment(
-        problem.knots, smooth, problem.s, problem.theta
-    )
+    penalty[1:, 1:], _ = penalty_between(
+        problem.knots, smooth.order, np.array(smooth.ratios or ()), problem.s,
+        problem.theta,
+    )  # fmt: skip
     start = np.concatenate([[0.0], problem.coefficients])
     strength = 2e6
     fit = solve(problem, smooth, strength)
@@ -72,8 +73,8 @@ def test_the_strength_taken_is_the_likeliest(problem):
     rows, shared = problem.jacobian, problem.shared
     weight = np.diag(problem.weight / shared)
     penalty = np.zeros((rows.shape[1],) * 2)
-    penalty[1:, 1:], nullity = penalty_on_moment(
-        problem.knots, Smooth(), problem.s, problem.theta
+    penalty[1:, 1:], nullity = penalty_between(
+        problem.knots, 2, np.empty(0), problem.s, problem.theta
     )
     start = np.concatenate([[0.0], problem.coefficients])
     free = nullity + 1

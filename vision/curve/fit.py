@@ -120,16 +120,20 @@ def _shared_power(part: Array, kept: float) -> float:
 
 @njit(cache=True)
 def _deviation(first: NDArray[np.int64], rows: Array, covariance: Array) -> Array:
-    """Root of the diagonal of A C A^T; a row of A holds `rows` from `first` on."""
+    """Root of the diagonal of A C A^T; a row of A holds `rows` from `first` on.
+
+    C is symmetric, and rows may end in zeros.
+    """
     out = np.empty(first.size)
-    count = rows.shape[1]
     for i in range(first.size):
-        power, start = 0.0, first[i]
-        for j in range(count):
-            pulled = 0.0
-            for k in range(count):
+        power, start, size = 0.0, first[i], rows.shape[1]
+        while size > 0 and rows[i, size - 1] == 0.0:
+            size -= 1
+        for j in range(size):
+            pulled = 0.5 * covariance[start + j, start + j] * rows[i, j]
+            for k in range(j):
                 pulled += covariance[start + j, start + k] * rows[i, k]
-            power += rows[i, j] * pulled
+            power += 2.0 * rows[i, j] * pulled
         out[i] = np.sqrt(max(power, 0.0))
     return out
 

@@ -136,24 +136,16 @@ class Smooth(NamedTuple):
     ratios: tuple[float, ...] | None = None
 
 
-def penalty_on_moment(
-    knots: Array, smooth: Smooth, s: Array, theta: Array
-) -> tuple[Array, int]:
-    """Return P with c^T P c the integral of M''^2 or (M' - F . n)^2, and its nullity.
-
-    M is a parabola between knots. The force F is the one that makes the integral least;
-    the normals are those of a curve with angles theta at s.
-    """
-    ratios = np.array(smooth.ratios or (), dtype=np.float64)
-    found: tuple[Array, int] = penalty_between(knots, smooth.order, ratios, s, theta)
-    return found
-
-
 @njit(cache=True)
 def penalty_between(
     knots: Array, order: int, ratios: Array, s: Array, theta: Array
 ) -> tuple[Array, int]:
-    """Return what `penalty_on_moment` does; M is tied at joints that have ratios."""
+    """Return P with c^T P c the integral of M''^2 or (M' - F . n)^2, and its nullity.
+
+    M is a parabola between knots, and tied at joints that have ratios (see `Smooth`).
+    The force F is the one that makes the integral least; the normals are those of a
+    curve with angles theta at s.
+    """
     first, length, bend, slope_at_start, slope_at_end = _pieces(knots)
     count = first.size
     tie = np.zeros(count - 1)

@@ -244,7 +244,9 @@ def _look(grey: Image, state: State, sign: float, turn: int, *, seeking: bool) -
     """Find the edges along the curve; know its width, blur and roughness after."""
     width = state.width
     step = 2.0 if seeking else 1.0
-    s, points, theta, half = _stations(state.curve, state.half, step, state.blur)
+    s, points, theta, normals, half = _stations(
+        state.curve, state.half, step, state.blur
+    )
     # At first the edges lie where they are expected to a pixel or two.
     reach, fuzz = min(0.35 * width, 6.0 + 0.1 * width), min(0.1 * width, 3.0)
     if turn:
@@ -252,7 +254,7 @@ def _look(grey: Image, state: State, sign: float, turn: int, *, seeking: bool) -
         reach = min(max(3.0, 3.0 * state.blur, 3.0 * fuzz), 0.45 * width)
     state.fuzz = fuzz
     edges = find_edges(
-        grey, points, normals_of(theta), -half, half, reach=reach,
+        grey, points, normals, -half, half, reach=reach,
         blur=state.blur if state.blurs is None else state.blurs, fuzz=fuzz, sign=sign,
         smooth=int(6.0 / step),
     )  # fmt: skip
@@ -278,15 +280,18 @@ def _look(grey: Image, state: State, sign: float, turn: int, *, seeking: bool) -
 @njit(cache=True)
 def _stations(
     curve: Curve, half: Array, step: float, blur: float
-) -> tuple[Array, Array, Array, Array]:
-    """Return arc lengths along a curve, points and angles there, and half widths.
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Return arc lengths along a curve, points, angles, normals and half widths there.
 
     Where the blur, of variance v, moves edges of curvature k, the points move: k v / 2.
     """
     s = np.linspace(0.0, curve.s[-1], int(curve.s[-1] / step) + 1)
     points, theta = points_at(curve, s)
     aside = 0.5 * blur**2 * np.interp(s, curve.s, curve.kappa)
-    return s, beside(points, theta, aside), theta, np.interp(s, curve.s, half)
+    normals = normals_of(theta)
+    for k in range(2):
+        points[:, k] += aside * normals[:, k]
+    return s, points, theta, normals, np.interp(s, curve.s, half)
 
 
 def covered(points: Array, places: Array | None) -> NDArray[np.bool_]:
