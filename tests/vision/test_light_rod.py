@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import cv2
 import numpy as np
 import pytest
 
 from magbend.vision import as_photo, extract
+from magbend.vision.extraction.quality import _lines_differ
 from magbend.vision.extraction.strip import along_candidate, blur_of
 from magbend.vision.find.candidate import Candidate
 from magbend.vision.find.ground import View
@@ -65,3 +68,17 @@ def test_shading_across_a_light_rod_is_no_blur():
     )  # fmt: skip
     view = View(grey=light(50.0).astype(np.float32), sign=-1.0)
     assert blur_of(along_candidate(view, rod))[0] < 0.1 * WIDTH
+
+
+def test_a_light_face_of_the_clamp_is_not_told_from_a_light_rod(monkeypatch):
+    plain = found(0.0)
+    assert "clamp_doubtful" not in plain.flags
+    monkeypatch.setattr("magbend.vision.extraction.quality._lines_differ", bool)
+    assert "clamp_doubtful" in found(0.0).flags
+
+
+@pytest.mark.parametrize(("apart", "differ"), [(0.5, False), (12.0, True)])
+def test_two_lines_at_a_clamp_differ_by_more_than_pixels(apart, differ):
+    face, front = (SimpleNamespace(s=s) for s in (-apart, 0.0))
+    rod = SimpleNamespace(clamp=SimpleNamespace(face=face, front=front))
+    assert _lines_differ(rod) == differ

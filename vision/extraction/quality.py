@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..curve.robust import quantile
 from ..edge.clamp import is_dark_line
 from ..edge.edges import clear_of
+from ..edge.ends import APART_PX
 from ..edge.flank import WHITE
 from ..edge.state import LostError
 from ..edge.white import SOME
@@ -163,7 +164,11 @@ def doubts(
         flags.append("root_hidden")
     pull = quantile(refined.shaded[refined.good], 0.9)
     unclear = candidate.root == "clamp" and _front_in_shade(refined, pull)
-    if unclear or CLAMP_DOUBTFUL in around:
+    if (
+        unclear
+        or (result.inverted and _lines_differ(refined))
+        or CLAMP_DOUBTFUL in around
+    ):
         flags.append(CLAMP_DOUBTFUL)
     if TIP_GOES_ON in around:
         flags.append(TIP_GOES_ON)
@@ -201,6 +206,17 @@ def _front_in_shade(refined: Refined, pull: float) -> bool:
     width = refined.typical_width
     smeared = smeared_px(refined, refined.clamp.blur) > SMEARED * width
     return smeared or (pull > SHADE_PX and refined.blur > UNRESOLVED * width)
+
+
+def _lines_differ(refined: Refined) -> bool:
+    """Whether a clamp's two lines lie apart, as its face does that is no dark one.
+
+    On a dark board it is as light as a light rod, whose root may be ahead of both.
+    """
+    lines = refined.clamp
+    if lines is None or lines.face is None or lines.front is None:
+        return False
+    return abs(lines.front.s - lines.face.s) > APART_PX
 
 
 def _is_white_in_mix(photo: Photo, result: Measurement, refined: Refined) -> bool:
