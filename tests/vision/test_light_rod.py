@@ -44,14 +44,17 @@ def light(lamp_deg: float, gloss: float = 0.0) -> np.ndarray:
     )
 
 
-def found(lamp_deg: float):
-    values = 1.055 * np.clip(light(lamp_deg, 0.2), 0.004, 1.0) ** (1 / 2.4) - 0.055
+def found(lamp_deg: float, gloss: float = 0.2):
+    values = 1.055 * np.clip(light(lamp_deg, gloss), 0.004, 1.0) ** (1 / 2.4) - 0.055
     return extract(as_photo(np.rint(255.0 * values).astype(np.uint8)), None)
 
 
-@pytest.mark.parametrize("lamp_deg", [0.0, 40.0, 65.0])
-def test_a_lamp_at_one_side_leaves_the_other_side_to_the_rod(lamp_deg):
-    result = found(lamp_deg)
+@pytest.mark.parametrize(
+    ("lamp_deg", "gloss"),
+    [(0.0, 0.2), (40.0, 0.2), (65.0, 0.2), (40.0, 0.0)],
+)
+def test_a_lamp_at_one_side_leaves_the_other_side_to_the_rod(lamp_deg, gloss):
+    result = found(lamp_deg, gloss)
     assert result.ok, result.reason
     inner = result.points_px[3:-3] - CENTRE
     assert np.abs(np.hypot(*inner.T) - RADIUS).mean() < 0.05 * WIDTH

@@ -3,7 +3,8 @@
 A hard shade that lies right beside a rod is darker than half of the paper, so that the
 edge of both together is clear and smooth. But across a rod alone the light is one level
 (or shading without a step, or a streak of gloss with dark on both sides): a step from
-one level to another, all along, is where the rod ends and its shade begins.
+one level to another, all along, is where the rod ends and its shade begins. That holds
+where shade is nearer to the rod's light than the paper is: not beside a light rod.
 """
 
 from __future__ import annotations
@@ -57,6 +58,8 @@ def rod_alone(strip: Strip, candidate: Candidate, width: float) -> Candidate | N
     near = np.abs(across) < 0.6 * width + 2.0 * clear
     across, light = across[near], strip.profiles[:, near]
     dark, paper = light.min(axis=1), light.max(axis=1)
+    if median(paper) < 0.0:  # a light rod, farther from shade than from the board
+        return None
     body = light < (dark + _EDGE * (paper - dark))[:, None]
     low, high = across[body.argmax(axis=1)], across[-1 - body[:, ::-1].argmax(axis=1)]
     inside = (across > low[:, None] + clear) & (across < high[:, None] - clear)
