@@ -10,12 +10,8 @@ from scipy.special import erf, ndtr
 
 from magbend.vision import Pose, as_photo, extract
 from magbend.vision.edge.clamp import ClampLines, between
-from magbend.vision.edge.step_line import (
-    EndFace,
-    crossings_of,
-    fit_step,
-    line_through,
-)
+from magbend.vision.edge.crossings import EndFace, crossings_of, line_through
+from magbend.vision.edge.step_line import fit_step
 from magbend.vision.edge.tip import _rough_end
 from magbend.vision.synthetic import (
     Block,

@@ -20,9 +20,10 @@ from ..curve.fit import solution
 from ..curve.joints import _evidence, _model
 from ..curve.likelihood import penalised
 from ..curve.spline import penalty_between
+from ..edge.crossings import _fit_line
 from ..edge.edges import _measure_side, _sample
 from ..edge.rough_edges import _rough_edges
-from ..edge.step_line import _fit_line, _fit_step
+from ..edge.step_line import _fit_step
 from ..extraction.extract import measure
 from ..extraction.setting import Setting
 from ..find.rod import _half_widths

@@ -17,18 +17,10 @@ from numpy.typing import NDArray
 from ...core.jit import njit
 from ..curve.curve import Curve
 from ..curve.robust import median
+from .crossings import Crossed, EndFace, crossings_of, line_through
 from .edges import clear_of
-from .step_line import (
-    SPAN,
-    STEP_PX,
-    Crossed,
-    EndFace,
-    crossings_of,
-    fit_step,
-    lanes,
-    lanes_along,
-    line_through,
-)
+from .lanes import lanes, lanes_along
+from .step_line import SPAN, STEP_PX, fit_step
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]

@@ -12,9 +12,9 @@ from ..curve.curve import Curve
 from ..curve.robust import median
 from .clamp import ClampLines, between, find_clamp, goes_on_at
 from .clamp_light import STEP, clamp_light
+from .crossings import EndFace
 from .edges import clear_of
 from .state import LostError, Root, Seen, State
-from .step_line import EndFace
 from .tip import find_tip
 from .wall_light import MIRRORED, SKY, Walls, short_of_end, wall_light
 

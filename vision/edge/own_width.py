@@ -17,8 +17,8 @@ from ..curve.robust import median
 from .edges import STEP_PX
 from .flank import median_profiles
 from .highlight import fit_bars
+from .lanes import sample_lanes
 from .state import Seen, State
-from .step_line import sample_lanes
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]

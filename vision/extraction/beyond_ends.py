@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from ...core.jit import njit
 from ..curve.robust import median, quantile
 from ..edge.edges import clear_of
+from ..edge.lanes import lanes
 from ..edge.state import LostError
-from ..edge.step_line import lanes
 from ..find.ground import View
 from ..picture.photo import Photo
 from .refine import Refined

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera.calibration import Calibration
-from ..edge.step_line import EndFace
+from ..edge.crossings import EndFace
 from ..edge.wall_light import WALL_PLACES
 from ..find.ground import View
 from .deviations import EDGE_MM, is_dark, white_px

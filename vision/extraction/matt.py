@@ -16,7 +16,7 @@ from ..curve.curve import Curve
 from ..curve.robust import median
 from ..edge.edges import clear_of
 from ..edge.highlight import Bars
-from ..edge.step_line import sample_lanes
+from ..edge.lanes import sample_lanes
 from ..find.ground import View
 
 Array = NDArray[np.float64]

@@ -17,11 +17,11 @@ from ..curve.problem import SHARED, pose
 from ..curve.robust import _median, median
 from ..curve.spline import Smooth
 from ..edge.clamp import ClampLines
+from ..edge.crossings import EndFace
 from ..edge.edges import find_edges
 from ..edge.ends import find_ends
 from ..edge.own_width import to_own_width
 from ..edge.state import LostError, Root, Seen, State
-from ..edge.step_line import EndFace
 from ..edge.wall_light import Walls, to_wall_ends
 from ..edge.white import is_cut_off, saturated, to_whole_edges
 from ..find.track import FLARED, Start

@@ -15,8 +15,8 @@ import numpy as np
 
 from ..camera.projection import LocalView
 from ..edge.clamp import between
+from ..edge.crossings import EndFace
 from ..edge.ends import APART_PX, is_face
-from ..edge.step_line import EndFace
 from .refine import Refined
 from .setting import UNKNOWN_CLAMP_MM, Setting
 

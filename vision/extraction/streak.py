@@ -19,7 +19,7 @@ from ..curve.curve import Curve
 from ..curve.robust import median, quantile
 from ..edge.flank import median_profiles
 from ..edge.highlight import fit_bars
-from ..edge.step_line import lanes
+from ..edge.lanes import lanes
 from ..find.candidate import Candidate
 from ..find.ground import View
 from ..find.track import smooth_curve, start_curve

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...core.jit import njit
 from ..curve.robust import median
-from ..edge.step_line import sample_lanes
+from ..edge.lanes import sample_lanes
 from ..find.candidate import Candidate
 from ..find.ground import View
 from ..find.track import resample
