@@ -72,6 +72,7 @@ def drawn(
 def measured(**what):
     found = extract(drawn(**what), SCALE, rod_height_mm=0.0)
     assert found.ok, found.reason
+    assert len(set(found.flags)) == len(found.flags)
     return found
 
 
@@ -100,6 +101,18 @@ def test_nor_is_that_of_a_shade_shorter_than_half_a_width(
     )
     assert abs(found.clamp_px[0] - ROOT[0]) < 1.5
     assert abs(found.length_mm - 20.0) < 0.08
+
+
+@pytest.mark.parametrize(("clamp", "on_rod"), [(0.02, 14), (0.1, 22), (0.2, 30)])
+def test_nor_is_it_where_that_shade_falls_on_a_coloured_rod(clamp, on_rod):
+    """In the rod's own colour a dark clamp is as light as paper, its shade half."""
+    part = strip(20.0, -0.5, 0.5)[np.r_[:on_rod, 800 - on_rod : 800]]
+    found = measured(
+        rod=RED, turn_deg=20.0, shade_px=(12, 9), deep=0.6, clamp=clamp,
+        over=[(0.4 * np.array(RED), part)],
+    )  # fmt: skip
+    assert abs(found.clamp_px[0] - ROOT[0]) < 0.7
+    assert abs(found.length_mm - 20.0) < 0.03
 
 
 @pytest.mark.parametrize(("rod", "deep"), [(RED, 0.66), (BLACK, 0.68)])

@@ -37,6 +37,11 @@ _ALIKE = 1.9
 """Standard deviation of the face's place over what its lanes scatter, were they
 independent: they lie close together on the rod, and share their levels."""
 
+DARKEST, DIMMED = 0.15, 0.8
+"""How far from the rod's light to the paper's what goes on behind a root may be; and in
+a mix of colours, in which a clamp's shade on the rod takes from its colour and a dark
+clamp may look like paper."""
+
 _LEAST_PX = 0.8
 """Blur for which a lane's own levels are sought at least: fewer samples do not tell."""
 
@@ -151,7 +156,7 @@ def _face(
     light = lanes_along(grey, curve, -s, across, sign)
     place = _steepest(light, s, -expected, reach, 0.12 * contrast)
     if not np.isnan(place):
-        place = _end_of_dark(light, s, place, 0.12 * contrast)
+        place = _end_of_dark(light, s, place, -expected - reach, 0.12 * contrast)
     crossing = crossings_of(light, s, place, near, 3.0, 4.0, 4.0)
     crossed: Crossed = line_through(light, s, across, crossing)
     return crossed
@@ -183,7 +188,9 @@ def _front(
     return crossed
 
 
-def goes_on_at(grey: Image, curve: Curve, s: Array, width: float) -> bool:
+def goes_on_at(
+    grey: Image, curve: Curve, s: Array, width: float, darkest: float = DARKEST
+) -> bool:
     """Whether a dark line between two lighter sides goes on at places behind a root.
 
     Parameters
@@ -200,13 +207,14 @@ def goes_on_at(grey: Image, curve: Curve, s: Array, width: float) -> bool:
     beside = 0.5 * width + 4.0
     across = np.array([-beside, -0.2 * width, 0.0, 0.2 * width, beside])
     before = lanes(grey, curve, np.linspace(1.0, 3.0, 9) * width, across)
-    return is_dark_line(before, lanes(grey, curve, s, across))
+    return is_dark_line(before, lanes(grey, curve, s, across), darkest)
 
 
-def is_dark_line(before: Array, behind: Array) -> bool:
+def is_dark_line(before: Array, behind: Array, darkest: float = DARKEST) -> bool:
     """Whether the dark between two lighter sides is seen behind as it is before.
 
-    Of each, shape (5, n), the first and the last lane lie beside the rod.
+    Of each, shape (5, n), the first and the last lane lie beside the rod. The middle
+    may be lighter by the part `darkest` of the way from rod to paper.
     """
     rod, paper = median(before[1:4].ravel()), median(before[::4].ravel())
     if paper == rod:
@@ -214,7 +222,7 @@ def is_dark_line(before: Array, behind: Array) -> bool:
     light = np.array([median(lane) for lane in behind])
     light = (light - rod) / (paper - rod)
     lighter = min(light[0], light[4]) - max(light[1:4].max(), 0.0)
-    return bool(light[1:4].max() < 0.15 and lighter > 0.12)
+    return bool(light[1:4].max() < darkest and lighter > 0.12)
 
 
 @njit(cache=True)
@@ -236,8 +244,10 @@ def _steepest(
 
 
 @njit(cache=True)
-def _end_of_dark(light: Array, s: Array, place: float, least: float) -> float:
-    """Return where lanes leave the dark of the rod, at or before their steepest rise.
+def _end_of_dark(
+    light: Array, s: Array, place: float, first: float, least: float
+) -> float:
+    """Return where lanes leave the dark of the rod, from `first` to the steepest rise.
 
     Between rod and clamp may lie the clamp's face, lighter than the one and darker than
     the other, so that its top edge is the steeper rise.
@@ -249,12 +259,13 @@ def _end_of_dark(light: Array, s: Array, place: float, least: float) -> float:
     steepest = int((place - s[0]) / STEP_PX)
     dark = np.nanmin(mean[: steepest + 1])
     k = steepest
-    while k > 0 and mean[k] > dark + 0.5 * least:
+    while k > 0 and s[k] > first and mean[k] > dark + 0.5 * least:
         k -= 1
     if k + 2 * lag >= steepest:
         return place
-    best, end = 0.0, place
+    best, end = 0.5 * least, place  # less is no end, but light that changes on it
     for j in range(max(k - lag, 0), k + lag):
-        if mean[j + lag] - mean[j] > best:
-            best, end = mean[j + lag] - mean[j], 0.5 * (s[j] + s[j + lag])
+        rise = mean[j + lag] - mean[j]
+        if s[j] >= first and rise > best:
+            best, end = rise, 0.5 * (s[j] + s[j + lag])
     return end

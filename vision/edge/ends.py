@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..curve.curve import Curve
 from ..curve.robust import median
-from .clamp import ClampLines, between, find_clamp, goes_on_at
+from .clamp import DARKEST, DIMMED, ClampLines, between, find_clamp, goes_on_at
 from .clamp_light import STEP, clamp_light
 from .crossings import EndFace
 from .edges import clear_of
@@ -97,11 +97,15 @@ def _clamp_lines(
     if lines.face is None and lines.front is None:
         return between_places(low, high, _SHADED * contrast)
     outer = _shade_line(lines, state, seen)
-    if outer is None and lines.front is not None:
+    # In a mix of colours a shade's border on the rod may seem to be its end.
+    line, darkest = lines.front, DARKEST
+    if line is None and state.plain is not None:
+        line, darkest = lines.face, DIMMED
+    if outer is None and line is not None:
         near = clear_of(max(state.blur, state.clamp_blur)) + state.face_px
-        at = lines.front.s - near - np.linspace(0.0, 2.0, 5)
-        if goes_on_at(grey, state.curve, at, width):
-            outer, low = lines.front.s, min(low, lines.front.s - 1.55 * width)
+        at = line.s - near - np.linspace(0.0, 2.0, 5)
+        if goes_on_at(grey, state.curve, at, width, darkest):
+            outer, low = line.s, min(low, line.s - 1.55 * width)
     if outer is None:
         return lines
     outer -= clear_of(state.blur) + _LAG_PX

@@ -311,7 +311,7 @@ def finish(
             refined = _refined(photo, view, start, candidate, setting, sd_px, joints)
             strip, result = along_rod(view, refined), None
         refusal(photo, view, strip, refined, candidate)
-        around = doubts_around(photo, strip, refined, candidate, setting)
+        around = doubts_around(photo, view, strip, refined, candidate, setting)
     if result is None:
         result = _in_mm(photo, view, refined, setting)
     return doubts(result, photo, around, refined, candidate, setting)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..curve.robust import quantile
-from ..edge.clamp import is_dark_line
+from ..edge.clamp import DARKEST, DIMMED, is_dark_line
 from ..edge.edges import clear_of
 from ..edge.ends import APART_PX
 from ..edge.flank import WHITE
@@ -105,15 +105,17 @@ def refusal(
 
 
 def doubts_around(
-    photo: Photo, strip: Strip, refined: Refined, candidate: Candidate, setting: Setting
-) -> set[str]:
+    photo: Photo, view: View, strip: Strip, refined: Refined, candidate: Candidate,
+    setting: Setting,
+) -> set[str]:  # fmt: skip
     """Return the doubts for what lies around a rod."""
     found = set()
     after_gap = not refined.rough and goes_on_after_gap(strip, refined)
     if candidate.rivalled or after_gap or len(candidate.hidden_px):
         found.add(OTHER_ROD)
     face_px = setting.face_px(refined.fit.curve)
-    if candidate.root == "clamp" and _goes_on(strip, refined, face_px):
+    darkest = DARKEST if view.plain else DIMMED
+    if candidate.root == "clamp" and _goes_on(strip, refined, face_px, darkest):
         found.add(CLAMP_DOUBTFUL)
     if not refined.rough and tip_goes_on(photo, strip, refined):
         found.add(TIP_GOES_ON)
@@ -196,7 +198,7 @@ def doubts(
         flags.append("width_mismatch")
     if setting.colour and _colour_is_off(photo, refined, setting.colour):
         flags.append(OTHER_COLOUR)
-    return replace(result, flags=tuple(flags))
+    return replace(result, flags=tuple(dict.fromkeys(flags)))
 
 
 def _front_in_shade(refined: Refined, pull: float) -> bool:
@@ -265,7 +267,9 @@ def direction_is_doubtful(sd_deg: float, length_mm: float) -> bool:
     return bool(np.radians(sd_deg) * length_mm > TURN_MM)
 
 
-def _goes_on(strip: Strip, refined: Refined, face_px: float) -> bool:
+def _goes_on(
+    strip: Strip, refined: Refined, face_px: float, darkest: float = DARKEST
+) -> bool:
     """Whether a dark line between two lighter sides goes on behind the clamp's line.
 
     Then that line may be the border of a shadow (or the clamp has an open groove).
@@ -275,6 +279,6 @@ def _goes_on(strip: Strip, refined: Refined, face_px: float) -> bool:
     across = strip.lanes(-beside, -0.2, 0.0, 0.2, beside)
     before = across[:, strip.between(width, 3.0 * width)]
     return any(
-        is_dark_line(before, across[:, strip.between(-last, -first)])
+        is_dark_line(before, across[:, strip.between(-last, -first)], darkest)
         for first, last in ((near, near + 0.2 * width), (width, 1.6 * width))
     )
