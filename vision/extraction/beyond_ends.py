@@ -17,7 +17,7 @@ from ...core.jit import njit
 from ..curve.robust import median, quantile
 from ..edge.edges import clear_of
 from ..edge.lanes import lanes
-from ..edge.state import LostError
+from ..edge.state import LostError, Root
 from ..find.ground import View
 from ..picture.photo import Photo
 from .refine import Refined
@@ -65,21 +65,33 @@ _BODY_PX = 4.0
 """How much of a body is looked at."""
 
 _BODY_DARK, _EVEN = 0.3, 0.2
-"""A body at a tip is darker than the paper by more than this share, all across."""
+"""A body at a tip is darker than the paper by more than this share, all across; and so
+even, as a share of the contrast, or of its own step where that may be faint."""
 
 
-def check_ends(photo: Photo, view: View, strip: Strip, refined: Refined) -> None:
+def check_ends(
+    photo: Photo, view: View, strip: Strip, refined: Refined, *, root: Root
+) -> None:
     """Refuse a rod in a clamp whose root is on bare paper, or whose tip meets a body.
 
     A clamp may be as light as the paper in the light that tells the rod best, but
-    hardly in all colours.
+    hardly in all colours. What enters at the border and ends at a body is a rod whose
+    tip is not in the picture, turned round.
 
     Raises
     ------
     LostError
         With flag and reason.
     """
-    if refined.clamp is None or refined.rough:
+    if refined.rough:
+        return
+    if root == "border" and _ends_at_front(strip, refined):
+        raise LostError(
+            "touches_border",
+            "the rod runs from the picture's border to something wide, such as a "
+            "clamp: take its free end into the picture, or what lies there away",
+        )
+    if refined.clamp is None:
         return
     if _on_paper([strip], refined) and _on_paper(
         _colours(photo, view, refined), refined
@@ -134,16 +146,38 @@ def _on_paper(strips: list[Strip], refined: Refined) -> bool:
 
 def _tip_at_body(strip: Strip, refined: Refined) -> bool:
     """Whether all is dark right beyond a tip, from one side to the other."""
+    rod, beside, level = _around_tip(strip, refined)
+    paper = quantile(beside.ravel(), 0.5)
+    contrast = paper - rod
+    dark = np.all(paper - level > _BODY_DARK * contrast)
+    return bool(dark and np.ptp(level) < _EVEN * contrast)
+
+
+def _ends_at_front(strip: Strip, refined: Refined) -> bool:
+    """Whether beyond a tip, from one side to the other, lies evenly another light.
+
+    It differs from the paper on either side of the rod: one may be in shade, which
+    ends where the rod does. The shade of a tip is no even one.
+    """
+    rod, beside, level = _around_tip(strip, refined)
+    papers = np.array([median(side.ravel()) for side in beside])
+    least = _OTHER * (papers.mean() - rod)
+    if papers.mean() < 0.0:  # see `_OTHER_DARK`
+        least = min(least, -_OTHER_DARK * papers.mean())
+    step = float(np.abs(papers - median(level)).min())
+    return bool(step > least and np.ptp(level) < _EVEN * step)
+
+
+def _around_tip(strip: Strip, refined: Refined) -> tuple[float, Array, Array]:
+    """Return the light on a rod before its tip, beside it there, and right beyond."""
     width, end = refined.typical_width, refined.fit.curve.s[-1]
     fore = strip.between(end - _FORE[1] * width, end - _FORE[0] * width)
-    paper = quantile(_sides(strip, refined)[:, :, fore].ravel(), 0.5)
-    contrast = paper - median(strip.lanes(0.0)[0, fore])
     near = end + clear_of(refined.blur) + 1.0
     body = strip.between(near, near + _BODY_PX)
     across = strip.lanes(*np.linspace(-_WIDE, _WIDE, 7))
     level = np.array([median(lane[body]) for lane in across])
-    dark = np.all(paper - level > _BODY_DARK * contrast)
-    return bool(dark and np.ptp(level) < _EVEN * contrast)
+    rod = median(strip.lanes(0.0)[0, fore])
+    return rod, _sides(strip, refined)[:, :, fore], level
 
 
 def _sides(strip: Strip, refined: Refined) -> Array:

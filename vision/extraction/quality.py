@@ -99,7 +99,7 @@ def refusal(
             "inconsistent",
             "the axis runs over bare paper for a while: two things may cross there",
         )
-    check_ends(photo, view, strip, refined)
+    check_ends(photo, view, strip, refined, root=candidate.root)
     if length < 5.0 * width:
         raise LostError("no_rod", "what looks like a rod is shorter than five widths")
 
