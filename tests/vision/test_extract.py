@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from magbend.vision import Pose, as_photo, extract, read_photo, score
+from magbend.vision.camera.calibrate import calibrate_known_length
 from magbend.vision.camera.calibration import Calibration
 from magbend.vision.synthetic import (
     BLACK,
@@ -377,6 +379,20 @@ def test_a_rod_much_wider_than_its_specimen_is_flagged():
     wide = extract(photo, one.truth.calibration).width_mm
     for side_mm, is_off in ((0.95 * wide, False), (0.88 * wide, True)):
         found = extract(photo, one.truth.calibration, side_mm=side_mm)
+        assert ("width_mismatch" in found.flags) == is_off
+
+
+def test_so_is_one_under_a_camera_of_unknown_height():
+    """Then no finite deviation covers the width."""
+    photo = as_photo(frame().image)
+    camera = calibrate_known_length(
+        (1200, 1000), from_px=(0.0, 0.0), to_px=(600.0, 0.0), length_mm=30.0
+    )
+    known = {"rod_height_mm": 0.9, "clamp_height_mm": 4.0}
+    wide = extract(photo, camera, **known)
+    assert not math.isfinite(wide.width_sd_mm)
+    for part, is_off in ((1.0, False), (0.5, True)):
+        found = extract(photo, camera, side_mm=part * wide.width_mm, **known)
         assert ("width_mismatch" in found.flags) == is_off
 
 

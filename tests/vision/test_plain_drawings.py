@@ -352,16 +352,32 @@ def test_a_rod_nearly_as_light_as_its_paper_is_found():
     assert found.width_px == pytest.approx(WIDTH, rel=0.05)
 
 
-def test_a_rod_whose_colour_does_not_tell_it_is_measured_in_plain_light(monkeypatch):
-    """Coarse colours of a JPEG may hide a clamp: such rods were refused."""
+def blind(shape):
+    return np.full(shape, 0.5)
 
-    def blind(photo, rod, view):
-        return rod, replace(view, grey=np.full_like(photo.grey, 0.5))
+
+def grainy(shape):
+    grain = cv2.GaussianBlur(np.random.default_rng(5).normal(size=shape), (0, 0), 4.0)
+    return 0.12 * grain / grain.std()
+
+
+@pytest.mark.parametrize(("light", "kept"), [(blind, 0.0), (grainy, 1.0)])
+def test_a_rod_whose_colour_does_not_tell_it_is_measured_in_plain_light(
+    monkeypatch, light, kept
+):
+    """Coarse colours of a JPEG may hide a clamp, or make a smooth rod rough."""
+
+    def in_its_colour(photo, rod, view):
+        grey = kept * photo.grey + light(photo.grey.shape)
+        return rod, replace(view, grey=grey.astype(np.float32), mix=(1.0, 1.0, -2.0))
 
     plain = measured(rod=RED, turn_deg=30.0)
-    monkeypatch.setattr("magbend.vision.extraction.extract.in_its_colour", blind)
+    monkeypatch.setattr(
+        "magbend.vision.extraction.extract.in_its_colour", in_its_colour
+    )
     found = measured(rod=RED, turn_deg=30.0)
     assert found.length_mm == pytest.approx(plain.length_mm, abs=0.05)
+    assert found.mix is None
     assert "other_rod" in found.flags
 
 

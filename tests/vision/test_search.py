@@ -16,6 +16,8 @@ from magbend.vision import (
     measure,
     specimen_to_px,
 )
+from magbend.vision.find.candidate import Candidate
+from magbend.vision.find.things import Thing, without_strokes
 from magbend.vision.synthetic import (
     BLACK,
     GREY,
@@ -246,3 +248,30 @@ def test_the_rod_ends_where_its_own_close_shade_begins():
     found = measured(replace(PLAIN, clamp=clamp, centreline=line, light=light))
     assert found.ok, found.reason
     assert found.length_mm == pytest.approx(22.0, abs=0.1)
+
+
+def thing(first, last, width_px, bend=0.0):
+    t = np.linspace(0.0, 1.0, 50)[:, None]
+    points = (
+        (1.0 - t) * np.array(first) + t * np.array(last) + np.array([0.0, bend]) * t**2
+    )
+    length = float(np.hypot(*np.diff(points, axis=0).T).sum())
+    return Thing([
+        Candidate(
+            points_px=points, width_px=width_px, length_px=length, root="border",
+            contacts=1, ratio=0.2,
+        )
+    ])  # fmt: skip
+
+
+def test_strokes_of_a_ruler_are_no_rods():
+    """Thin and held by the border, they look liker rods than a wide one does."""
+    strokes = [
+        thing((40.0 + 50.0 * k, 0.0), (44.0 + 50.0 * k, 110.0 - 20.0 * (k % 2)), 4.0)
+        for k in range(5)
+    ]
+    rod = thing((50.0, 400.0), (420.0, 400.0), 36.0, bend=-90.0)
+    assert without_strokes([*strokes, rod]) == [rod]
+    # Rods side by side, of which none is longer, stay rivals.
+    assert without_strokes(strokes) == strokes
+    assert len(without_strokes([*strokes[:2], rod])) == 3

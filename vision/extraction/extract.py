@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -209,16 +210,26 @@ def measure_candidate(
         rod, seen = candidate, in_lightness(photo, None if parted else candidate, view)
     if seen is view:
         return _measured_in(photo, setting, rod, view, strip, far, glossy=parted)
-    try:
+    found = None
+    with suppress(LostError):
         new = along_candidate(seen, rod)
-        return _measured_in(
+        found = _measured_in(
             photo, setting, rod, seen, new, far, glossy=is_parted(new)
         )  # fmt: skip
-    except LostError:
+        # What makes a rod rough in a mix of colours may be the mix's noise.
+        if seen.plain or "rough_edges" not in found.flags:
+            return found
+    try:
         plain = _measured_in(
             photo, setting, candidate, view, strip, far, glossy=parted
         )  # fmt: skip
-        return _doubted(plain)
+    except LostError:
+        if found is None:
+            raise
+        return found
+    if found is not None and "rough_edges" in plain.flags:
+        return found
+    return _doubted(plain)
 
 
 def _measured_in(

@@ -244,7 +244,9 @@ def _side_is_off(result: Measurement, setting: Setting) -> bool:
     """Whether a rod is wider or thinner than its specimen by more than a print is."""
     if setting.side_mm is None or not math.isfinite(result.width_mm):
         return False
-    tolerance = SIDE_TOLERANCE * setting.side_mm + 3.0 * result.width_sd_mm
+    tolerance = SIDE_TOLERANCE * setting.side_mm
+    if math.isfinite(result.width_sd_mm):  # nobody may know how far the camera is
+        tolerance += 3.0 * result.width_sd_mm
     return abs(result.width_mm - setting.side_mm) > tolerance
 
 

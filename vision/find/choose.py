@@ -18,7 +18,7 @@ from .lines import without_lines
 from .rod import LEAST_SHARE, find_candidates
 from .rod_colour import ALIKE, distance_from
 from .shadeless import shades
-from .things import Thing, find_things
+from .things import Thing, find_things, without_strokes
 
 Array = NDArray[np.float64]
 Clamp = Literal["auto", "none"]
@@ -163,6 +163,7 @@ def _search(photo: Photo, sought: Sought, binary: Binary) -> tuple[Candidate, Vi
     things = find_things(binary, [1.0 - level for level in LEVELS], least)
     if not things:
         things = find_things(binary, [1.0 - level for level in FAINT], least)
+    things = without_strokes(things)
     if sought.colour:
         _compare_colours(photo, sought.colour, things)
     if sought.width_px or sought.length_px or sought.colour:

@@ -24,6 +24,9 @@ _THIN = 25.0
 """Length over width above which a thing is no more like a rod: lines are longer."""
 LEAST_LEVELS = 2
 """Seen at fewer levels, a thing is a pattern of noise."""
+_STROKES, _PARALLEL, _STRAIGHT, _LONGER = 3, 0.05, 0.93, 1.5
+"""So many alike, parallel to so many radians and so straight (as pixels tell), are
+strokes of a scale beside a thing that is so many times longer."""
 
 
 @dataclass(slots=True)
@@ -98,6 +101,40 @@ def find_things(
                 held.seen.append(item)
     stable = _joined([thing for thing in things if len(thing.seen) >= LEAST_LEVELS])
     return sorted(stable, key=lambda thing: -thing.worth)
+
+
+def without_strokes(things: list[Thing]) -> list[Thing]:
+    """Leave out the strokes of a ruler's scale where something longer is left."""
+    rest: list[Thing] = []
+    longest = 0.0
+    for thing in things:
+        if _alike_beside(thing, things) < _STROKES:
+            rest.append(thing)
+        else:
+            longest = max(longest, thing.best.length_px)
+    longer = any(thing.best.length_px > _LONGER * longest for thing in rest)
+    return rest if longer else things
+
+
+def _alike_beside(thing: Thing, things: list[Thing]) -> int:
+    """Return how many straight things lie like one, itself among them, side by side."""
+    one = thing.best
+    along = one.points_px[-1] - one.points_px[0]
+    along = along / np.hypot(*along)
+    count = 0
+    for other in (item.best for item in things):
+        chord = other.points_px[-1] - other.points_px[0]
+        across = abs(along[0] * chord[1] - along[1] * chord[0])
+        beside = other.points_px[len(other.points_px) // 2] - one.points_px[0]
+        shift = float(beside @ along) / one.length_px
+        count += (
+            np.hypot(*chord) > _STRAIGHT * other.length_px
+            and across < _PARALLEL * np.hypot(*chord)
+            and _within(one.length_px, other.length_px, 0.5)
+            and _within(one.width_px, other.width_px, 0.4)
+            and -0.5 < shift < 1.5
+        )
+    return count
 
 
 def _joined(things: list[Thing]) -> list[Thing]:
