@@ -11,6 +11,7 @@ import pytest
 from magbend.vision import as_photo, extract
 from magbend.vision.camera.calibration import scale_calibration
 from magbend.vision.curve.curve import Curve
+from magbend.vision.edge.clamp import DARKEST
 from magbend.vision.extraction.quality import _goes_on, doubts
 from magbend.vision.extraction.refine import refine
 from magbend.vision.extraction.setting import Setting
@@ -40,14 +41,14 @@ def measured(seed=0):
 def test_root_put_short_of_the_clamp_is_doubted():
     photo, _, refined = measured()
     view = View(grey=photo.grey, sign=1.0)
-    assert not _goes_on(along_rod(view, refined), refined, 0.0)
+    assert not _goes_on(along_rod(view, refined), refined, 0.0, DARKEST)
     whole = refined.fit.curve
     short = Curve(
         s=whole.s[60:] - whole.s[60], points=whole.points[60:],
         theta=whole.theta[60:], kappa=whole.kappa[60:],
     )  # fmt: skip
     refined = replace(refined, fit=replace(refined.fit, curve=short))
-    assert _goes_on(along_rod(view, refined), refined, 0.0)
+    assert _goes_on(along_rod(view, refined), refined, 0.0, DARKEST)
 
 
 def test_direction_that_leaves_the_tip_unsure_is_doubted():

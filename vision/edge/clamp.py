@@ -189,7 +189,7 @@ def _front(
 
 
 def goes_on_at(
-    grey: Image, curve: Curve, s: Array, width: float, darkest: float = DARKEST
+    grey: Image, curve: Curve, s: Array, width: float, darkest: float
 ) -> bool:
     """Whether a dark line between two lighter sides goes on at places behind a root.
 
@@ -203,6 +203,8 @@ def goes_on_at(
         Arc lengths, px; those behind the root are negative.
     width : float
         Width of the rod, px.
+    darkest : float
+        `DARKEST`, or `DIMMED` in a mix of colours.
     """
     beside = 0.5 * width + 4.0
     across = np.array([-beside, -0.2 * width, 0.0, 0.2 * width, beside])
@@ -210,7 +212,7 @@ def goes_on_at(
     return is_dark_line(before, lanes(grey, curve, s, across), darkest)
 
 
-def is_dark_line(before: Array, behind: Array, darkest: float = DARKEST) -> bool:
+def is_dark_line(before: Array, behind: Array, darkest: float) -> bool:
     """Whether the dark between two lighter sides is seen behind as it is before.
 
     Of each, shape (5, n), the first and the last lane lie beside the rod. The middle

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..curve.curve import Curve
+from ..curve.curve import Curve, normals_of
 from ..picture.photo import Photo
 
 Array = NDArray[np.float64]
@@ -184,7 +184,7 @@ def _sampled(
     light: Image, window: tuple[slice, slice], points: Array, theta: Array, aside: Array
 ) -> Array:
     """Return colours of lanes beside an axis, (n, k, 3); NaN outside the window."""
-    normals = np.column_stack([-np.sin(theta), np.cos(theta)])
+    normals = normals_of(theta)
     spots = points[:, None] + aside[:, None] * normals[:, None]
     x, y = np.moveaxis(np.rint(spots).astype(int), -1, 0)
     x, y = x - window[1].start, y - window[0].start

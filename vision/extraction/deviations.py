@@ -52,9 +52,7 @@ def is_dark(seen_in: View) -> bool:
     return seen_in.sign > 0.0 and seen_in.plain
 
 
-def faces_px(
-    refined: Refined, wall: Array, seen_in: View, *, told: bool
-) -> Array:  # fmt: skip
+def faces_px(refined: Refined, wall: Array, seen_in: View, *, told: bool) -> Array:
     """Return the doubt of the midline by side faces, px, positive on the right.
 
     Parameters

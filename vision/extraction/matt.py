@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from ..curve.curve import Curve
+from ..curve.curve import Curve, beside
 from ..curve.robust import median
 from ..edge.edges import clear_of
 from ..edge.highlight import Bars
@@ -114,7 +114,7 @@ def _along(view: View, streak: Streak, s: Array, bars: Bars, room: int) -> Array
 def _lane(view: View, curve: Curve, s: Array, offset: Array) -> Array:
     """Return the light along a lane of changing offset, a mean over a pixel or so."""
     points, theta = curve.at(s)
-    points = points + offset[:, None] * np.column_stack([-np.sin(theta), np.cos(theta)])
+    points = beside(points, theta, offset)
     across = np.array([-0.5, 0.0, 0.5])
     light = sample_lanes(view.grey, points, theta, across, view.sign)
     return np.asarray(light.mean(axis=0))

@@ -269,9 +269,7 @@ def direction_is_doubtful(sd_deg: float, length_mm: float) -> bool:
     return bool(np.radians(sd_deg) * length_mm > TURN_MM)
 
 
-def _goes_on(
-    strip: Strip, refined: Refined, face_px: float, darkest: float = DARKEST
-) -> bool:
+def _goes_on(strip: Strip, refined: Refined, face_px: float, darkest: float) -> bool:
     """Whether a dark line between two lighter sides goes on behind the clamp's line.
 
     Then that line may be the border of a shadow (or the clamp has an open groove).

@@ -120,9 +120,7 @@ def root_place(
     return RootPlace(s=seen_at[0], sd=0.5 * abs(apart), apart=apart)
 
 
-def _sd(
-    refined: Refined, line: EndFace | None, *doubts: float
-) -> float:  # fmt: skip
+def _sd(refined: Refined, line: EndFace | None, *doubts: float) -> float:
     """Return the deviation of a place that a line tells, with other doubts, px."""
     own = 0.0 if line is None else line.place_sd
     smeared = 0.0 if line is None else SMEARED * smeared_px(refined, line.blur)

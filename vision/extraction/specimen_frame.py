@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..camera.calibration import Calibration
 from ..camera.find_tag import TaggedClamp
+from ..curve.curve import normals_of
 from ..curve.robust import median
 from ..edge.state import LostError
 from ..edge.tip import ROUND_END
@@ -83,7 +84,7 @@ def _pixel_columns(
     grid = fit.curve.s
     systematic = SAMPLING_PX + SHADE_LEFT * refined.shaded
     width = np.interp(s, grid, refined.width)
-    right = np.column_stack([-np.sin(theta), np.cos(theta)]) * 0.5 * width[:, None]
+    right = normals_of(theta) * 0.5 * width[:, None]
     return {
         "x_px": points[:, 0],
         "y_px": points[:, 1],

@@ -77,11 +77,6 @@ class Strip:
         share = np.full(parts.shape[2], 1.0 / parts.shape[2])
         return np.ascontiguousarray((parts @ share).T)
 
-    def beside(self, offset: Array) -> Array:
-        """Return points at offsets from the axis, px, shape (n,), as (n, 2)."""
-        normals = np.column_stack([-np.sin(self.theta), np.cos(self.theta)])
-        return np.asarray(self.points + offset[:, None] * normals)
-
     def between(self, first: float, last: float) -> slice:
         """Return the stations from one arc length to another, the nearest at least."""
         low, high = _nearest(self.s, first, last).tolist()

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.jit import njit
+from ..curve.curve import beside
 from ..curve.robust import median
 from ..edge.edges import clear_of
 from ..find.candidate import Candidate
@@ -78,7 +79,8 @@ def rod_alone(strip: Strip, candidate: Candidate, width: float) -> Candidate | N
     if len(found) < _LEAST_PARTS * PARTS:
         return None
     s, low, high = np.array(found).T
-    points = strip.beside(np.interp(strip.s, s, 0.5 * (low + high)))
+    aside = np.interp(strip.s, s, 0.5 * (low + high))
+    points = beside(strip.points, strip.theta, aside)
     return replace(candidate, points_px=points, width_px=median(high - low))
 
 

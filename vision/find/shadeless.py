@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..curve.curve import normals_of
 from ..curve.robust import median
 from ..picture.photo import Photo
 from .candidate import Candidate
@@ -233,7 +234,7 @@ def _lanes(rod: Candidate) -> tuple[Array, Array, Array]:
     """Return points along a rod, their normals, and offsets of lanes beside it."""
     _, points, theta = resample(rod.points_px, 0.6 * rod.width_px)
     every = max(1, len(points) // _STATIONS)
-    normals = np.column_stack([-np.sin(theta), np.cos(theta)])
+    normals = normals_of(theta)
     reach = _BESIDE * rod.width_px + _BESIDE_PX
     side = np.arange(1.0, reach)
     return points[::every], normals[::every], np.concatenate([-side[::-1], [0.0], side])

@@ -105,24 +105,23 @@ def find_things(
 
 def without_strokes(things: list[Thing]) -> list[Thing]:
     """Leave out the strokes of a ruler's scale where something longer is left."""
-    rest: list[Thing] = []
-    longest = 0.0
-    for thing in things:
-        if _alike_beside(thing, things) < _STROKES:
-            rest.append(thing)
-        else:
-            longest = max(longest, thing.best.length_px)
+    best = [thing.best for thing in things]
+    strokes = [_alike_beside(item, best) >= _STROKES for item in best]
+    longest = max(
+        (item.length_px for item, stroke in zip(best, strokes, strict=True) if stroke),
+        default=0.0,
+    )
+    rest = [thing for thing, stroke in zip(things, strokes, strict=True) if not stroke]
     longer = any(thing.best.length_px > _LONGER * longest for thing in rest)
     return rest if longer else things
 
 
-def _alike_beside(thing: Thing, things: list[Thing]) -> int:
+def _alike_beside(one: Candidate, things: list[Candidate]) -> int:
     """Return how many straight things lie like one, itself among them, side by side."""
-    one = thing.best
     along = one.points_px[-1] - one.points_px[0]
     along = along / np.hypot(*along)
     count = 0
-    for other in (item.best for item in things):
+    for other in things:
         chord = other.points_px[-1] - other.points_px[0]
         across = abs(along[0] * chord[1] - along[1] * chord[0])
         beside = other.points_px[len(other.points_px) // 2] - one.points_px[0]

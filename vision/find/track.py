@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.jit import njit
-from ..curve.curve import Curve
+from ..curve.curve import Curve, normals_of
 from ..curve.fit import fit_curve
 from ..curve.problem import SHARED
 from ..curve.robust import median
@@ -95,7 +95,7 @@ def start_curve(
         None where no two edges are seen along most of the curve.
     """
     s, along, theta = resample(points, 0.6 * width)
-    normals = np.column_stack([-np.sin(theta), np.cos(theta)])
+    normals = normals_of(theta)
     aside = 0.5 if sign > 0.0 else _LIGHT_ASIDE
     low, high, dark, level = rough_edges(
         grey, along, normals, reach=aside * width + 4.0 + 2.0 * blur, sign=sign
