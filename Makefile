@@ -24,7 +24,7 @@ test: $(VENV)/.ready-test
 check: $(VENV)/.ready-test
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	rm -rf build/check
+	rm -rf build/check build/lib
 	$(PIP) --no-deps --target build/check .
 	cd build/check && ../../$(BIN)/mypy --config-file ../../pyproject.toml \
 	  -p magbend --namespace-packages --explicit-package-bases
