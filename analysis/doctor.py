@@ -174,7 +174,7 @@ def _cameras() -> list[Finding]:
 def _camera_indices() -> list[int]:
     if sys.platform.startswith("linux"):
         nodes = Path("/dev").glob("video*")
-        return sorted(int(n.name[5:]) for n in nodes if n.name[5:].isdigit())[:8]
+        return sorted(int(n.name[5:]) for n in nodes if n.name[5:].isdecimal())[:8]
     return list(range(3))
 
 

@@ -102,8 +102,7 @@ class ZaberStage(PolledStage):
     def _say(self, link: Link, command: str, axis: int | None = None) -> list[str]:
         """Send a command to this axis; return the words of its reply."""
         number = self.options.axis if axis is None else axis
-        while link.waiting_line() is not None:
-            pass  # alerts, and answers that came too late
+        link.waiting_lines()  # alerts, and answers that came too late
         link.write(f"/1 {number} {command}\n".encode("ascii"))
         for _ in range(10):
             line = link.read_line(self._config.answer_timeout_s)

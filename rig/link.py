@@ -121,7 +121,8 @@ class Link:
     def read_line(self, timeout_s: float) -> str | None:
         """Return the next whole line without its end, or None when time is up.
 
-        A line that has not ended stays in the buffer; empty lines are skipped.
+        A line that has not ended stays in the buffer, also of a device that never ends
+        one; empty lines are skipped.
 
         Raises
         ------
@@ -130,15 +131,15 @@ class Link:
         """
         self._require_owner()
         deadline_s = self._clock.monotonic_s() + timeout_s
-        while True:
-            line = self._take_line()
-            if line is not None:
-                return line
-            if not self._receive() and self._clock.monotonic_s() >= deadline_s:
+        while (line := self._take_line()) is None:
+            is_late = self._clock.monotonic_s() >= deadline_s
+            self._receive()  # once more when late: what has come counts
+            if is_late and b"\n" not in self._buffer:
                 return None
+        return line
 
-    def waiting_line(self) -> str | None:
-        """Return a line that is already here, or None at once.
+    def waiting_lines(self) -> list[str]:
+        """Return the whole lines that are already here, at once.
 
         Raises
         ------
@@ -146,10 +147,9 @@ class Link:
             If the device is gone.
         """
         self._require_owner()
-        line = self._take_line()
-        if line is None and self._waiting() and self._receive():
-            line = self._take_line()
-        return line
+        if self._waiting():
+            self._receive()
+        return list(iter(self._take_line, None))
 
     def close(self) -> None:
         """Close the port; never raises."""
@@ -170,7 +170,7 @@ class Link:
         except SERIAL_ERRORS as error:
             raise self._lost(error) from None
 
-    def _receive(self) -> bool:
+    def _receive(self) -> None:
         port = self._require_open()
         try:
             data = port.read(1)
@@ -181,7 +181,6 @@ class Link:
         self._buffer += data
         self._unlogged += data
         self._log_received(whole=True)
-        return bool(data)
 
     def _log_received(self, *, whole: bool) -> None:
         """Record what came in, whole lines only or all of it."""

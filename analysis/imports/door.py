@@ -117,7 +117,7 @@ def read_shape(
 
 def _chosen(path: Path, shapes: list[RawShape], wanted: str) -> RawShape:
     matching = shapes
-    if wanted.isdigit():
+    if wanted.isdecimal():
         matching = shapes[int(wanted) - 1 : int(wanted)] if int(wanted) else []
     elif wanted and "=" in wanted:
         asked = case_parameters(wanted)

@@ -38,7 +38,7 @@ def read_dxf(path: Path) -> list[RawShape]:
     pairs = list(
         zip(map(str.strip, lines[::2]), map(str.strip, lines[1::2]), strict=False)
     )
-    if not pairs or not all(code.lstrip("-").isdigit() for code, _ in pairs[:50]):
+    if not pairs or not all(code.lstrip("-").isdecimal() for code, _ in pairs[:50]):
         raise ConfigError(f"{path}: is no DXF text (binary DXF: save it as ASCII)")
     unit = ""
     for (_, name), (code, value) in itertools.pairwise(pairs):

@@ -70,7 +70,7 @@ def shrunk(image: NDArray[Any], width: str) -> bytes:
     """
     import cv2
 
-    if not width.isdigit() or not 16 <= int(width) <= _WIDEST_PX:
+    if not width.isdecimal() or not 16 <= int(width) <= _WIDEST_PX:
         raise InputError(f"width must be from 16 to {_WIDEST_PX} px")
     height, wide = image.shape[:2]
     if wide > int(width):

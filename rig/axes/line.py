@@ -97,8 +97,7 @@ class LineAxis:
             wait(self._clock, _POLL_S, check)
 
     def _read(self, check: Check) -> float:
-        while self._link.waiting_line() is not None:
-            pass  # late answers to what was asked before
+        self._link.waiting_lines()  # late answers to what was asked before
         self._send(self._config.read_line)
         check()
         answer = self._link.read_line(_ANSWER_S)

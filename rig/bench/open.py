@@ -81,7 +81,7 @@ def open_camera(config: CameraConfig, folder: Path, clock: Clock) -> Camera:
     else:
         from ..camera.opencv import OpenCvSource
 
-        device = int(source) if str(source).isdigit() else source
+        device = int(source) if str(source).isdecimal() else source
         make = lambda: OpenCvSource(device, config, clock)  # noqa: E731
     return CaptureCamera(make, without_secrets(str(source)), config, clock)
 
@@ -110,7 +110,7 @@ def _backend_of(source: str | int, folder: Path) -> str:
     text = str(source)
     if text.startswith(("http://", "https://")):
         return "mjpeg"
-    if text.isdigit() or "://" in text or text.startswith("/dev/"):
+    if text.isdecimal() or "://" in text or text.startswith("/dev/"):
         return "opencv"
     path = folder / text
     if path.is_dir():

@@ -65,7 +65,10 @@ class Presence:
         place, map_, mark = (noted.get(key) for key in ("machine_mm", "map", "mark"))
         if not isinstance(place, list) or not isinstance(map_, dict):
             return None
-        machine_mm = tuple(float(value) for value in place)
+        try:
+            machine_mm = tuple(float(value) for value in place)
+        except (TypeError, ValueError):
+            return None
         return LeftPlace(machine_mm=machine_mm, map=map_, mark=mark)
 
 

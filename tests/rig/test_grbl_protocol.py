@@ -41,6 +41,8 @@ from magbend.rig.stage.grbl.protocol import (
         ("ok\0\r", Other("ok\0")),
         ("okok", Other("okok")),
         ("ALARM:", Other("ALARM:")),
+        ("ALARM:\xb2", Other("ALARM:\xb2")),  # a digit, but none of a number
+        ("<Hold:\xb2|MPos:0,0,0>", Other("<Hold:\xb2|MPos:0,0,0>")),
         ("<Idle|MPos:1.0", Other("<Idle|MPos:1.0")),
     ],
 )

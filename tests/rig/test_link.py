@@ -10,9 +10,10 @@ import pytest
 
 from magbend.core.errors import StageError
 from magbend.rig.clock import ScaledClock, SteppedClock, SystemClock
-from magbend.rig.errors import LinkLostError
+from magbend.rig.errors import LinkLostError, StageTimeoutError
 from magbend.rig.link import Link
 from magbend.rig.ports import resolve_port
+from magbend.rig.stage.grbl.session import GrblSession
 from magbend.rig.stage.presence import LeftPlace, Presence
 from magbend.rig.virtual.board.firmware import GrblBoard
 from magbend.rig.virtual.protocol_twin import register_board
@@ -60,6 +61,35 @@ def test_an_endless_line_does_not_fill_the_memory(twin):
     board.send(b"\r\nok\r\n")
     lines = [link.read_line(0.2), link.read_line(0.2)]
     assert "ok" in lines
+
+
+class _Babbler:
+    """A port on which something talks without end, as another device does."""
+
+    in_waiting = 16
+
+    def __init__(self, clock, text: bytes) -> None:
+        self._clock, self._text = clock, text
+
+    def read(self, size: int) -> bytes:
+        self._clock.sleep(0.001)
+        return self._text[:1] if size == 1 else self._text[1:]
+
+    def write(self, data: bytes) -> None:
+        pass
+
+
+@pytest.mark.parametrize("text", [b"x" * 16, b"23.4\n" * 4])
+def test_a_device_that_never_falls_quiet_is_given_its_time_and_no_more(twin, text):
+    _, link, clock = twin
+    port, link._serial = link._serial, _Babbler(clock, text)
+    session = GrblSession(link, clock, answer_timeout_s=1.0)
+    begin_s = clock.monotonic_s()
+    assert session.ask(0.5) is None
+    with pytest.raises(StageTimeoutError, match="did not answer"):
+        session.command("$$")
+    assert clock.monotonic_s() - begin_s < 12.0
+    link._serial = port
 
 
 def test_waiting_takes_the_time_of_the_clock(twin):
@@ -139,6 +169,13 @@ def test_a_remembered_place_is_told_once():
     left = LeftPlace(machine_mm=(-1.0, -2.0, -3.0), map={"direction": 1}, mark=17.0)
     presence.remember(left)
     assert presence.recall() == left
+    assert presence.recall() is None
+
+
+@pytest.mark.parametrize("text", ['{"machine_mm": ["a"], "map": {}}', "[]", "\0"])
+def test_a_note_that_was_spoiled_is_no_note(text):
+    presence = Presence("/dev/ttySPOILT")
+    presence._position_file.write_text(text, encoding="utf-8")
     assert presence.recall() is None
 
 

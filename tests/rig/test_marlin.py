@@ -36,7 +36,8 @@ class MarlinBoard:
         self._out: list[tuple[float, bytes]] = []
         self.x_mm = 37.0
         self.homed = self.silent = self.short = self.old = False
-        self.waits = self.place_in_ok = False
+        self.waits = self.place_in_ok = self.relative = False
+        self.offset_mm = 0.0  # G92
         self.ok = "ok"
         self.seen: list[str] = []
         self.say("start\necho:Marlin 2.1.2.4", 0.5)
@@ -80,12 +81,15 @@ class MarlinBoard:
                 self.say("echo:busy: processing", now + second)
             now = self._free_s
         elif match := re.match(r"G1 X(\S+) F(\S+)", line):
-            distance = float(match[1]) - self.x_mm
+            distance = float(match[1]) + self.offset_mm - self.x_mm
+            distance = float(match[1]) if self.relative else distance
             self._free_s = now + abs(distance) / (float(match[2]) / 60.0)
             self.x_mm += distance * (0.5 if self.short else 1.0)
         elif line.startswith("M118") and not self.old:
             self.say(line[5:], now)
-        elif line.startswith(("M118", "M211")):
+        elif line in ("G90", "G91"):
+            self.relative = line == "G91"
+        elif line.startswith(("M118", "M211")) or (line == "G21" and self.old):
             self.say(f'echo:Unknown command: "{line}"', now)
         elif line == "M400":
             now = max(now, self._free_s)
@@ -93,7 +97,8 @@ class MarlinBoard:
             self._free_s = now
         elif line == "M114":
             steps = round(self.x_mm * 80)
-            place = f"X:{self.x_mm:.2f} Y:0.00 Z:0.00 E:0.00 Count X:{steps} Y:0"
+            logical = self.x_mm - self.offset_mm
+            place = f"X:{logical:.2f} Y:0.00 Z:0.00 E:0.00 Count X:{steps} Y:0"
             self.say(f"ok {place}" if self.place_in_ok else place, now)
         if not (line == "M114" and self.place_in_ok):
             self.say(self.ok, now)
@@ -138,6 +143,35 @@ def test_it_homes_its_axis_alone_and_goes_to_gaps(bench):
     assert "G28 X" in board.seen
     assert stage.limits.travel_mm == (0.0, 200.0)
     assert max(_steps(board.seen)) <= 10.0 + 1e-6
+
+
+def test_coordinates_that_another_program_left_relative_are_absolute_again(tmp_path):
+    # A jog of a print host says G91 first; cut off there, G1 X37.5 would be 37.5 mm on.
+    clock, board = InterruptingClock(), MarlinBoard()
+    config = StageConfig(
+        driver="marlin", port=register_board("relative", board, clock),
+        homing="manual", feed_mm_min=600.0,
+    )  # fmt: skip
+    stage = MarlinStage(config, clock)
+    stage.connect()
+    board.relative = True
+    stage.nudge(0.5)
+    assert board.x_mm == 37.5
+    stage.assume_homed(37.5, (160.0, -1))
+    board.relative = True
+    stage.move_to(50.0, feed_mm_min=600.0)
+    assert board.x_mm == 50.0
+
+
+def test_nothing_moves_by_coordinates_that_are_offset(bench):
+    board, stage, _ = bench
+    stage.connect()
+    stage.home()
+    stage.goto_gap(100.0)
+    board.offset_mm = 30.0
+    with pytest.raises(StageError, match=r"30\.000 mm.*G92"):
+        stage.goto_gap(90.0)
+    assert board.x_mm == 60.0
 
 
 def _steps(lines: list[str]) -> list[float]:

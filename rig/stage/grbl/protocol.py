@@ -104,7 +104,7 @@ def alarm_text(code: int) -> AlarmText:
 
 def error_text(code: str) -> str:
     """Return what ``error:code`` means."""
-    known = ERRORS.get(int(code)) if code.isdigit() else None
+    known = ERRORS.get(int(code)) if code.isdecimal() else None
     return known or "see the manual of the firmware"
 
 
@@ -216,7 +216,7 @@ def parse_line(text: str) -> Line:
         return Refusal(line[6:].strip())
     if line.startswith("ALARM:"):
         digits = line[6:].strip()
-        return Alarm(int(digits)) if digits.isdigit() else Other(line)
+        return Alarm(int(digits)) if digits.isdecimal() else Other(line)
     if line.startswith("<"):
         return parse_report(line) or Other(line)
     if _BANNER.match(line):
@@ -237,7 +237,7 @@ def parse_report(line: str) -> Report | None:
     head, *rest = line[1:-1].split("|")
     name, _, sub = head.partition(":")
     state = name.lower()
-    if state not in _STATES or (sub and not sub.isdigit()):
+    if state not in _STATES or (sub and not sub.isdecimal()):
         return None
     fields: dict[str, str] = {}
     for part in rest:

@@ -103,12 +103,12 @@ class GrblSession:
 
     def pump(self, timeout_s: float) -> Line | None:
         """Read and note one line; None when time is up."""
-        text = self._link.read_line(max(timeout_s, 0.0))
+        text = self._link.read_line(timeout_s)
         return None if text is None else self._note(parse_line(text))
 
     def drain(self) -> None:
         """Note everything that is already here; stray ``ok``s fall away."""
-        while (text := self._link.waiting_line()) is not None:
+        for text in self._link.waiting_lines():
             self._note(parse_line(text))
 
     def command(self, line: str, *, timeout_s: float | None = None) -> list[Line]:
@@ -131,13 +131,11 @@ class GrblSession:
         self._link.write(line.encode("ascii") + b"\n")
         end_s = self._clock.monotonic_s() + _PATIENCE * limit_s
         restarts, lines = self.restarts, list[Line]()
-        while True:
+        while (left_s := end_s - self._clock.monotonic_s()) > 0.0:
             # A board that still talks is not late: each line gives it time anew.
-            answer = self.pump(min(limit_s, end_s - self._clock.monotonic_s()))
+            answer = self.pump(min(limit_s, left_s))
             if answer is None:
-                raise StageTimeoutError(
-                    f"the stage did not answer {line!r} within {limit_s:.0f} s"
-                )
+                break
             if isinstance(answer, Ok):
                 self.in_step = True
                 return lines
@@ -148,6 +146,9 @@ class GrblSession:
                 raise self.alarm_error(answer.code)
             self.raise_if_restarted(restarts)
             lines.append(answer)
+        raise StageTimeoutError(
+            f"the stage did not answer {line!r} within {limit_s:.0f} s"
+        )
 
     def raise_if_restarted(self, restarts: int) -> None:
         """Raise if the board restarted since `restarts` was noted.
@@ -176,10 +177,11 @@ class GrblSession:
         self.drain()
         self._link.write_realtime(STATUS)
         deadline_s = self._clock.monotonic_s() + timeout_s
-        while True:
-            line = self.pump(deadline_s - self._clock.monotonic_s())
+        while (left_s := deadline_s - self._clock.monotonic_s()) > 0.0:
+            line = self.pump(left_s)
             if line is None or isinstance(line, (Report, Alarm, Banner)):
                 return line if isinstance(line, Report) else None
+        return None
 
     def ask_place(self, timeout_s: float) -> Report | None:
         """Ask until the machine position is known.

@@ -9,6 +9,7 @@ stand.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import re
 from collections.abc import Callable, Sequence
@@ -43,6 +44,8 @@ class MarlinSession:
         Whether it stopped itself (``kill()``); only a restart helps.
     place_mm : float or None
         The last reported place of the stage's axis, in mm.
+    planned_mm : float or None
+        Where the axis goes in the coordinates that lines are given in, in mm.
     """
 
     def __init__(self, link: Link, clock: Clock, *, answer_timeout_s: float) -> None:
@@ -54,6 +57,7 @@ class MarlinSession:
         self.restarts = 0
         self.halted = False
         self.place_mm: float | None = None
+        self.planned_mm: float | None = None
 
     def machine(self) -> tuple[float, ...] | None:
         """Return the last reported place of the axis, in mm."""
@@ -61,7 +65,7 @@ class MarlinSession:
 
     def drain(self) -> None:
         """Read what is already here."""
-        while (line := self._link.waiting_line()) is not None:
+        for line in self._link.waiting_lines():
             self._note(line)
 
     def listen(self, quiet_s: float, most_s: float) -> None:
@@ -125,8 +129,22 @@ class MarlinSession:
     def ask_place(self, axis: str, step_mm: float) -> float | None:
         """Ask where the axis is (``M114``), in mm."""
         self.place_mm = None
-        self.place_mm = read_position(self.command("M114"), axis, 1.0 / step_mm)
+        lines = self.command("M114")
+        self.place_mm = read_position(lines, axis, 1.0 / step_mm)
+        self.planned_mm = read_planned(lines, axis)
         return self.place_mm
+
+    def make_absolute(self) -> None:
+        """Let coordinates be absolute and in mm, however an earlier program left them.
+
+        Raises
+        ------
+        LineRefusedError
+            If the board knows no absolute coordinates.
+        """
+        with contextlib.suppress(LineRefusedError):  # a build that knows mm alone
+            self.command("G21")
+        self.command("G90")
 
     def _exchange(
         self,
@@ -226,5 +244,10 @@ def read_position(lines: Sequence[str], axis: str, steps_per_mm: float) -> float
     counted = re.search(rf"Count.*?\b{axis}:\s*{_NUMBER}", text)
     if counted:
         return float(counted.group(1)) / steps_per_mm
-    planned = re.search(rf"\b{axis}:\s*{_NUMBER}", text)
+    return read_planned(lines, axis)
+
+
+def read_planned(lines: Sequence[str], axis: str) -> float | None:
+    """Read the planned place of ``M114`` in mm: offsets of ``G92`` are in it."""
+    planned = re.search(rf"\b{axis}:\s*{_NUMBER}", " ".join(lines))
     return float(planned.group(1)) if planned else None

@@ -67,8 +67,7 @@ class MarlinStage(SerialStage[MarlinSession]):
         self._trust.lose()
         limit_s = self._config.home_timeout_s or _HOME_S
         with self._stand_if_interrupted(at_once=True):
-            for line in ("G21", "G90"):
-                session.command(line)
+            session.make_absolute()
             lines = session.command(
                 f"G28 {self._config.axis}",
                 timeout_s=limit_s,
@@ -220,7 +219,7 @@ class MarlinStage(SerialStage[MarlinSession]):
             raise
         except StageTimeoutError as error:
             self._give_up(error)
-        if here is None or abs(here - target_mm) > 1.01 * self.limits.step_mm + 0.01:
+        if here is None or not self._is_at(target_mm, here):
             self._trust.doubt()
             raise StageTimeoutError(
                 f"the stage stopped at {here} mm instead of {target_mm:.3f} mm"
@@ -252,10 +251,23 @@ class MarlinStage(SerialStage[MarlinSession]):
         return self._require_session().ask_place(self._config.axis, self.limits.step_mm)
 
     def _known_mm(self) -> float:
-        here = self._machine_mm()
+        """Return where the board stands, ready to be sent elsewhere by its count."""
+        session = self._require_session()
+        session.make_absolute()
+        here, planned = self._machine_mm(), session.planned_mm
         if here is None:
             raise PositionLostError("the stage does not report its position; home it")
+        if planned is not None and not self._is_at(planned, here):
+            raise StageError(
+                f"the board counts {here:.3f} mm where its coordinates say "
+                f"{planned:.3f} mm: it moves, or they are offset by G92 or M206; wait, "
+                "or clear the offset (G92.1, M206 X0 Y0 Z0)"
+            )
         return here
+
+    def _is_at(self, target_mm: float, here_mm: float) -> bool:
+        # The board rounds to whole steps and reports two decimals.
+        return abs(here_mm - target_mm) <= 1.01 * self.limits.step_mm + 0.01
 
 
 def _question(session: MarlinSession, boot_s: float) -> tuple[str, list[str]]:
