@@ -361,24 +361,41 @@ def grainy(shape):
     return 0.12 * grain / grain.std()
 
 
-@pytest.mark.parametrize(("light", "kept"), [(blind, 0.0), (grainy, 1.0)])
-def test_a_rod_whose_colour_does_not_tell_it_is_measured_in_plain_light(
-    monkeypatch, light, kept
-):
-    """Coarse colours of a JPEG may hide a clamp, or make a smooth rod rough."""
+def colour_shows(monkeypatch, light, kept, aside):
+    """Let a rod's colour show it so many widths aside, in a light that is no better."""
 
     def in_its_colour(photo, rod, view):
         grey = kept * photo.grey + light(photo.grey.shape)
-        return rod, replace(view, grey=grey.astype(np.float32), mix=(1.0, 1.0, -2.0))
+        points = rod.points_px + np.array([0.0, aside * rod.width_px])
+        view = replace(view, grey=grey.astype(np.float32), mix=(1.0, 1.0, -2.0))
+        return replace(rod, points_px=points), view
 
-    plain = measured(rod=RED, turn_deg=30.0)
     monkeypatch.setattr(
         "magbend.vision.extraction.extract.in_its_colour", in_its_colour
     )
+
+
+@pytest.mark.parametrize(("light", "kept"), [(blind, 0.0), (grainy, 1.0)])
+@pytest.mark.parametrize("aside", [0.0, 0.25])
+def test_a_rod_whose_colour_does_not_tell_it_is_measured_in_plain_light(
+    monkeypatch, light, kept, aside
+):
+    """Coarse colours of a JPEG may hide a clamp, or make a smooth rod rough.
+
+    Where they show the rod all the same, plain light that shows it there is no doubt.
+    """
+    plain = measured(rod=RED, turn_deg=30.0)
+    colour_shows(monkeypatch, light, kept, aside)
     found = measured(rod=RED, turn_deg=30.0)
     assert found.length_mm == pytest.approx(plain.length_mm, abs=0.05)
     assert found.mix is None
-    assert "other_rod" in found.flags
+    assert ("other_rod" in found.flags) == (aside > 0.0)
+
+
+def test_plain_light_is_not_believed_where_colour_shows_the_rod_elsewhere(monkeypatch):
+    colour_shows(monkeypatch, blind, 0.0, 0.8)
+    found = extract(drawn(rod=RED, turn_deg=30.0), SCALE, rod_height_mm=0.0)
+    assert not found.ok
 
 
 @pytest.mark.parametrize(("shade_px", "alone"), [((-17, 3), True), ((-16, 6), False)])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -16,6 +15,7 @@ from ..camera.calibration import Calibration
 from ..camera.find_tag import TaggedClamp, tagged_clamp
 from ..camera.oriented import oriented
 from ..curve.curve import Curve
+from ..curve.robust import median
 from ..edge.state import LostError
 from ..find.candidate import Candidate
 from ..find.choose import find_rod, search_rod
@@ -70,6 +70,11 @@ of the width, which are more on a yarn."""
 TOO_FAR, COLLAPSED, ROUGHLY = 0.5, 0.9, 1.0
 """Blur, in widths, in which a width cannot be told from the blur; and width over that
 of the start, below which edges were lost, with how well that is known, px."""
+
+
+AS_COLOURED, ELSEWHERE = 0.1, 0.5
+"""How far a side may be from where a rod's colour has it, in widths: so little that it
+is no shade's, and so much that it is no side of that rod."""
 
 
 def extract(photo: Photo, calibration: Calibration | None, **known: Any) -> Measurement:
@@ -210,15 +215,17 @@ def measure_candidate(
         rod, seen = candidate, in_lightness(photo, None if parted else candidate, view)
     if seen is view:
         return _measured_in(photo, setting, rod, view, strip, far, glossy=parted)
-    found = None
-    with suppress(LostError):
+    found = lost = None
+    try:
         new = along_candidate(seen, rod)
         found = _measured_in(
             photo, setting, rod, seen, new, far, glossy=is_parted(new)
         )  # fmt: skip
-        # What makes a rod rough in a mix of colours may be the mix's noise.
-        if seen.plain or "rough_edges" not in found.flags:
-            return found
+    except LostError as error:
+        lost = error
+    # What makes a rod rough in a mix of colours may be the mix's noise.
+    if found is not None and (seen.plain or "rough_edges" not in found.flags):
+        return found
     try:
         plain = _measured_in(
             photo, setting, candidate, view, strip, far, glossy=parted
@@ -227,9 +234,29 @@ def measure_candidate(
         if found is None:
             raise
         return found
-    if found is not None and "rough_edges" in plain.flags:
+    apart = AS_COLOURED if seen.plain else _apart(plain, rod)
+    if found is not None and ("rough_edges" in plain.flags or apart > ELSEWHERE):
         return found
-    return _doubted(plain)
+    if lost is not None and apart > ELSEWHERE:
+        raise lost
+    return plain if apart < AS_COLOURED else _doubted(plain)
+
+
+def _apart(plain: Measurement, rod: Candidate) -> float:
+    """Return how far a side is from where the colour of a rod has it, in its widths.
+
+    Colour tells sides less well, but knows no shade.
+    """
+    points, n = plain.points, len(rod.points_px)
+    axis = np.column_stack([points["x_px"], points["y_px"]])
+    right = np.column_stack([points["right_x_px"], points["right_y_px"]])
+    inner = rod.points_px[n // 8 : n - n // 8]
+    nearest = np.hypot(*(inner[:, None] - axis).T).argmin(axis=0)
+    across = (right - axis)[nearest]
+    across /= np.hypot(*across.T)[:, None]
+    aside = median(np.sum((inner - axis[nearest]) * across, axis=1))
+    wider = 0.5 * (plain.width_px - rod.width_px)
+    return (abs(aside) + abs(wider)) / rod.width_px
 
 
 def _measured_in(
