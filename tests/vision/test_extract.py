@@ -15,6 +15,7 @@ from hypothesis.extra.numpy import arrays
 from magbend.vision import Pose, as_photo, extract, read_photo, score
 from magbend.vision.camera.calibrate import calibrate_known_length
 from magbend.vision.camera.calibration import Calibration
+from magbend.vision.extraction import refine
 from magbend.vision.synthetic import (
     BLACK,
     BLUE,
@@ -65,6 +66,22 @@ def test_synthetic_frames_are_measured_to_hundredths_of_a_pixel(kind, angle, see
     assert (
         abs(result.tip_angle_deg - np.degrees(one.truth.centreline.theta_rad[-1])) < 1
     )
+
+
+def test_a_clear_rod_is_looked_at_twice_and_its_ends_sought_twice(monkeypatch):
+    """Once to find them, and once to measure: more would not move them."""
+    asked = []
+    for name in ("_look", "find_ends"):
+
+        def noted(*args, name=name, asked_for=getattr(refine, name), **options):
+            asked.append(name)
+            return asked_for(*args, **options)
+
+        monkeypatch.setattr(refine, name, noted)
+    drawn = frame("arc", 90.0)
+    found = extract(as_photo(drawn.image), drawn.truth.calibration)
+    assert score(found, drawn.truth).rms_px < 0.02
+    assert asked.count("_look") == asked.count("find_ends") == 2
 
 
 def test_hard_shadow_is_named_and_mostly_undone():

@@ -29,21 +29,21 @@ _LEAST_SHADE, _SEEN_ON, _SHADED, _LAG_PX = 0.25, 0.7, 0.5, 1.5
 there that show two edges, if it is a shade's; contrast in the shade over that on paper;
 and half of what a rise is taken over."""
 
-_FINE = 2
-"""The first pass whose ends are more than places to look at next."""
-
 
 def find_ends(
-    grey: Image, state: State, seen: Seen, root: Root, sign: float, turn: int,
-    walls: Walls | None,
+    grey: Image, state: State, seen: Seen, root: Root, sign: float,
+    walls: Walls | None, *, fine: bool,
 ) -> tuple[EndFace, ClampLines | None, float]:  # fmt: skip
-    """Return the tip, the lines at a clamp, and the arc length where the rod begins."""
+    """Return the tip, the lines at a clamp, and the arc length where the rod begins.
+
+    Those that are not `fine` only tell where to look next.
+    """
     curve, width = state.curve, state.width
-    outwards = 0.4 * width if turn == 0 else 0.0
-    reach = 1.3 * width if turn == 0 else 0.3 * width + 2.0
+    outwards = 0.0 if fine else 0.4 * width
+    reach = 0.3 * width + 2.0 if fine else 1.3 * width
     edges = seen.edges
     near = seen.good & (seen.s > curve.s[-1] - 3.0 * width)
-    middle = median(edges.middle[near]) if near.any() and turn == 0 else 0.0
+    middle = median(edges.middle[near]) if near.any() and not fine else 0.0
     end = seen.good & (seen.s > curve.s[-1] - 1.5 * width)
     taper = median(edges.width[end]) if end.sum() > 3 else width
     face = None if walls is None else _face_seen(state, walls)
@@ -51,7 +51,7 @@ def find_ends(
         tip = find_tip(
             grey, curve, expected=state.last + outwards, width=min(width, taper),
             blur=state.tip_blur or state.blur, reach=far, middle=middle, face=face,
-            sign=sign, fine=turn >= _FINE,
+            sign=sign, fine=fine,
         )  # fmt: skip
         if tip is not None:
             break
@@ -60,7 +60,7 @@ def find_ends(
             "no_tip", "the free end of the rod shows no edge: lay plain paper there"
         )
     state.tip_blur = tip.blur
-    if walls is not None and turn >= _FINE:
+    if walls is not None and fine:
         tip = _to_end_of_face(tip, state, seen, walls)
     if root == "border":
         return tip, None, _border_crossing(grey, curve)
@@ -68,17 +68,17 @@ def find_ends(
         return tip, None, _other_end(grey, state, sign, outwards, reach)
     lines = ClampLines(face=None, front=None)
     if state.clamp_light is None:
-        lines = _clamp_lines(grey, state, seen, sign, turn)
+        lines = _clamp_lines(grey, state, seen, sign, fine=fine)
     if lines.face is None and lines.front is None:
-        lines = _in_own_light(state, turn)
+        lines = _in_own_light(state, fine=fine)
     elif state.plain is not None:
-        lines = _with_front(lines, state.plain, state, seen, turn)
+        lines = _with_front(lines, state.plain, state, seen, fine=fine)
     state.clamp_blur = lines.blur
     return tip, lines, _first(lines, state.face_px)
 
 
 def _clamp_lines(
-    grey: Image, state: State, seen: Seen, sign: float, turn: int
+    grey: Image, state: State, seen: Seen, sign: float, *, fine: bool
 ) -> ClampLines:
     """Return the lines at a clamp, but not the front of its shade."""
 
@@ -86,12 +86,12 @@ def _clamp_lines(
         return find_clamp(
             grey, state.curve, expected=0.5 * (low + high), width=state.width,
             blur=state.clamp_blur or state.blur, contrast=contrast,
-            reach=0.5 * (high - low), sign=sign, fine=turn >= _FINE,
+            reach=0.5 * (high - low), sign=sign, fine=fine,
         )  # fmt: skip
 
     width, contrast = state.width, seen.edges.contrast
     low, high = state.first - 0.3 * width - 3.0, state.first + 0.3 * width + 3.0
-    if turn == 0:
+    if not fine:
         low, high = state.first - 1.55 * width, state.first + 1.05 * width
     lines = between_places(low, high, contrast)
     if lines.face is None and lines.front is None:
@@ -113,7 +113,7 @@ def _clamp_lines(
     return lines if inner.face is None and inner.front is None else inner
 
 
-def _in_own_light(state: State, turn: int) -> ClampLines:
+def _in_own_light(state: State, *, fine: bool) -> ClampLines:
     """Return the lines at a clamp that the light which shows the rod does not show."""
     light, expected, reach = state.clamp_light, state.first, 0.3 * state.width + 3.0
     if light is None and state.photo is not None:
@@ -128,14 +128,14 @@ def _in_own_light(state: State, turn: int) -> ClampLines:
         return find_clamp(
             image, state.curve, expected=expected, width=state.width,
             blur=state.clamp_blur or state.blur, contrast=STEP, reach=reach,
-            fine=turn >= _FINE,
+            fine=fine,
         )  # fmt: skip
 
     return ClampLines(face=seen_in(light.rod).face, front=seen_in(light.paper).front)
 
 
 def _with_front(
-    lines: ClampLines, plain: Image, state: State, seen: Seen, turn: int
+    lines: ClampLines, plain: Image, state: State, seen: Seen, *, fine: bool
 ) -> ClampLines:
     """Return lines with the front of a clamp that has no colour of its own.
 
@@ -145,7 +145,7 @@ def _with_front(
         return lines
     found = find_clamp(
         plain, state.curve, expected=lines.face.s, width=state.width, blur=state.blur,
-        contrast=_SHADED * seen.edges.contrast, reach=APART_PX, fine=turn >= _FINE,
+        contrast=_SHADED * seen.edges.contrast, reach=APART_PX, fine=fine,
     )  # fmt: skip
     front = found.front
     if front is None or abs(front.s - lines.face.s) > APART_PX:

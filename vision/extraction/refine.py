@@ -33,12 +33,13 @@ Image = NDArray[np.float32]
 _PASSES = 5
 _NEAR_PX = 0.4
 """The first pass, or the first two, only seek the rod: on every other station, with a
-supple curve. Two where the first moved it by more; its ends can wait."""
+supple curve; after the first its ends can wait. Two where it moved by more."""
 _SURE_PX = 0.25
 """A start that is so sure need not be sought."""
-_STILL_PX, _ENDS_STILL_PX = 0.05, 0.15
+_STILL_PX, _ENDS_STILL_PX = 0.05, 0.5
 """By how much the curve and its ends may move when all is found: the next pass would
-move it by a tenth of that. The ends are those of the curve as it is then."""
+move it by a tenth of that. The ends are those of the curve as it is then, which an arc
+carries on so far."""
 _PULLED_STILL_PX, _PULLED_PX = 0.02, 0.02
 """By how much where half of the midline is pulled by so much, by shade, or by blur
 where it is bent: the blur is found slowly there, and both hang on it."""
@@ -182,7 +183,7 @@ def refine(
     seen = _look(grey, state, sign, 0, seeking=seeking)
     first, end, still_px = 0.0, last, _NEAR_STILL_PX
     if not np.isfinite(sd_px):
-        tip, lines, first = find_ends(grey, state, seen, root, sign, 0, walls)
+        tip, lines, first = find_ends(grey, state, seen, root, sign, walls, fine=False)
         end, still_px = tip.s, _STILL_PX
     places, aside, walled, settled = None, np.inf, 0.0, False
     for turn in range(_PASSES):
@@ -211,20 +212,18 @@ def refine(
         state.curve, state.half = fit.curve, 0.5 * width
         state.first, state.last = 0.0, float(fit.curve.s[-1])
         sought, seeking = seeking, seeking and not turn and aside > _NEAR_PX
-        if seeking:
+        if sought and not turn:
             first, end = 0.0, state.last
             continue
         # The ends of the curve as it is now: often they move when it does not.
-        later = turn + 1 if sought else turn + 2
-        tip, lines, first = find_ends(grey, state, seen, root, sign, later, walls)
+        tip, lines, first = find_ends(grey, state, seen, root, sign, walls, fine=True)
         end = tip.s
         moved = abs(first) + abs(end - state.last)
         near_px = still_px
         pulled = shaded + 0.5 * state.blur**2 * np.abs(fit.curve.kappa)
         if still_px == _STILL_PX and median(pulled) > _PULLED_PX:
             near_px = _PULLED_STILL_PX
-        still = aside < near_px and moved < _ENDS_STILL_PX
-        settled = still and not sought
+        settled = aside < near_px and moved < _ENDS_STILL_PX and not sought
         if settled:
             break
     curve = fit.curve._replace(s=fit.curve.s - first)
