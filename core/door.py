@@ -88,6 +88,25 @@ def inside(folder: Path, name: str, kind: type[MagbendError] = ConfigError) -> P
     return path
 
 
+def real_path(path: Path) -> Path:
+    """Return where a path leads through its links; from a ring of links, nowhere."""
+    return Path(os.path.realpath(path))  # `Path.resolve` raises on a ring
+
+
+def file_below(folder: Path, name: str) -> Path | None:
+    """Return the file that a stranger's name leads to, in `folder` or below.
+
+    None where there is no such file, or the name or a link leads elsewhere.
+    """
+    root = real_path(folder)
+    try:
+        found = real_path(root / name)
+        is_file = found.is_file()
+    except (OSError, ValueError):  # too long a name, a zero byte
+        return None
+    return found if root in found.parents and is_file else None
+
+
 def _short(path: Path) -> str:
     text = str(path)
     return text if len(text) < 300 else shown(text)

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..core.door import file_below
 from ..core.errors import InputError, StoreError
 from .bench.sight import pack
 from .photos.actions import figure_of
@@ -90,10 +91,8 @@ def run_file(panel: Panel, run: str, path: str, width: str) -> Path | File:
     InputError, StoreError
         If there is no such run, or no such file that may be shown.
     """
-    folder = panel.workspace.run_path(run).resolve()
-    found = (folder / path).resolve()
-    is_inside = folder in found.parents and found.suffix.lower() in SERVED
-    if not is_inside or not found.is_file():
+    found = file_below(panel.workspace.run_path(run), path)
+    if found is None or found.suffix.lower() not in SERVED:
         raise StoreError(f"the run {run} has no file {path!r} to show")
     if not width:
         return found

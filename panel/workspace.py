@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..core.door import real_path
 from ..core.errors import ConfigError, InputError, MagbendError
 from ..core.json import read_json
 from ..core.specimen import Specimen
@@ -71,7 +72,7 @@ class Workspace:
     """
 
     def __init__(self, rig: Path) -> None:
-        self.rig_path = rig.resolve()
+        self.rig_path = real_path(rig)
         self.folder = self.rig_path.parent
         self._stamp: object = None
         self._files: BenchFiles | None = None

@@ -23,6 +23,7 @@ import numpy as np
 from ...core.centreline import COLUMNS
 from ...core.decode import read_bytes
 from ...core.derived import note_derived
+from ...core.door import real_path
 from ...core.errors import ConfigError
 from ...core.files import output_folder, write_bytes, write_text
 from ...core.magnet import Magnet
@@ -310,7 +311,7 @@ def _commit(
         name = text.partition("@")[0].strip()
         if name:
             path = inside(table, row.line, name)
-            below = path.relative_to(table.parent.resolve())
+            below = path.relative_to(real_path(table.parent))
             target = f"{SOURCES}/{below.as_posix()}"
             output_folder((folder.path / target).parent)
             files[target] = read_bytes(path)

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.door import file_below
 from ...core.errors import ConfigError
 from ...core.files import write_text
 from ...core.table import Table, read_table
@@ -144,15 +145,12 @@ def inside(table: Path, line: int, name: str) -> Path:
     ConfigError
         If it lies elsewhere or is missing.
     """
-    folder = table.parent.resolve()
-    path = (folder / name).resolve()
-    if not path.is_relative_to(folder):
+    path = file_below(table.parent, name)
+    if path is None:
         raise ConfigError(
-            f"{table}, line {line}: {name} must lie in the folder of the table; copy "
-            "it there"
+            f"{table}, line {line}: there is no file {name[:200]}, which must lie in "
+            "the folder of the table; copy it there"
         )
-    if not path.is_file():
-        raise ConfigError(f"{table}, line {line}: there is no file {name}")
     return path
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -59,13 +60,14 @@ class JudgedScan:
     def lines(self) -> list[str]:
         """Return the same for people."""
         fit = self.fit
-        widened = ""
+        widened, sure = "", f" +- {fit.remanence_sd_T:.4f} T"
         if fit.birge_ratio > 1.0:
             widened = f" (sd widened by their Birge ratio {fit.birge_ratio:.2g})"
+        if math.isnan(fit.remanence_sd_T):
+            sure = ""
         lines = [
-            f"remanence {fit.remanence_T:.4f} T +- {fit.remanence_sd_T:.4f} T from "
-            f"{len(fit.readings)} readings{widened}; put it into [magnet] of the rig "
-            "file",
+            f"remanence {fit.remanence_T:.4f} T{sure} from {len(fit.readings)} "
+            f"readings{widened}; put it into [magnet] of the rig file",
             "gap mm   flux mT  fitted mT  residual",
         ]
         for reading in fit.readings:

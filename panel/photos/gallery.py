@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...core.door import file_below
 from ...core.errors import InputError, MagbendError
 from ..workspace import Workspace
 
@@ -36,11 +37,9 @@ def photo_path(workspace: Workspace, name: str) -> Path:
     InputError
         If it is none, or lies elsewhere.
     """
-    folder = workspace.folder.resolve()
-    path = (folder / name).resolve()
-    is_inside = folder in path.parents and path.suffix.lower() in ENDINGS
-    if not is_inside or not path.is_file():
-        raise InputError(f"there is no photograph {name!r} in {folder}")
+    path = file_below(workspace.folder, name)
+    if path is None or path.suffix.lower() not in ENDINGS:
+        raise InputError(f"there is no photograph {name!r} in {workspace.folder}")
     return path
 
 

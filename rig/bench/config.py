@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
+from ...core.door import real_path
 from ...core.errors import ConfigError
 from ...core.magnet import Vector
 from ...core.specimen import Specimen
@@ -235,7 +236,7 @@ def read_rig(path: Path) -> RigModel:
         One sentence with file, line and key.
     """
     rig = read_toml(path, RigModel)
-    folder = path.resolve().parent
+    folder = real_path(path).parent
     here = folder == Path.cwd()  # a short name in messages and records, where it can be
     stage = rig.stage if here else rig.stage.lying_in(folder)
     return rig.model_copy(update={"stage": stage})
@@ -256,12 +257,12 @@ def read_plan(path: Path) -> Plan:
         r"^\s*(\[\s*specimen\b|specimen\s*=\s*\{)", text, re.MULTILINE
     )
     model = read_toml(path, InlinePlanModel if is_inline else PlanModel)
-    rig_path = (path.parent / model.rig).resolve()
+    rig_path = real_path(path.parent / model.rig)
     rig = read_rig(rig_path)
     if isinstance(model, InlinePlanModel):
         specimen = model.specimen.specimen()
     else:
-        specimen = read_specimen((path.parent / model.specimen).resolve())
+        specimen = read_specimen(real_path(path.parent / model.specimen))
     _check_gaps(path, text, model, rig, rig_path)
     lumen = model.lumen
     return Plan(

@@ -64,7 +64,8 @@ class MagnetFit:
     Parameters
     ----------
     remanence_T, remanence_sd_T : float
-        The remanence and its standard deviation; NaN with one reading and no sd.
+        The remanence and its standard deviation; NaN with one reading and no sd, also
+        if that reading is given more than once.
     remanence_95_T : tuple of float
         Its 95 % interval: the wider of what the scatter (Student's t) and the standard
         deviations given (normal) say.
@@ -185,9 +186,11 @@ def fit_magnet(
     weight = 1.0 / sigma**2
     remanence = float(np.sum(weight * share * flux) / np.sum(weight * share**2))
     predicted = remanence * share
-    spare = len(flux) - (2 if free_offset else 1)
+    # A reading given twice to its last digit tells of its scatter once.
+    told = len(flux) if sd is not None else len(set(zip(gaps, flux, strict=True)))
+    spare = told - (2 if free_offset else 1)
     chi2 = float(np.sum(weight * (predicted - flux) ** 2))
-    chi2_reduced = chi2 / spare if spare else math.nan
+    chi2_reduced = chi2 / spare if spare > 0 else math.nan
     step = 1e-4 * sides_mm[2]
     slope = (
         remanence
@@ -238,7 +241,7 @@ def _reach_95(scatter: float, spare: int, *, stated: bool) -> float:
 
     By Student's t for the scatter seen; if they are stated, at least by the normal law.
     """
-    by_scatter = student_t_95(spare) * scatter if spare else math.nan
+    by_scatter = student_t_95(spare) * scatter if spare > 0 else math.nan
     return max(NormalDist().inv_cdf(0.975), by_scatter) if stated else by_scatter
 
 
@@ -262,10 +265,10 @@ def _checked(
             "gaps_mm, flux_mT and sd_mT must be lists of one length; instead received "
             f"{gaps.shape} mm and {flux.shape} mT"
         )
-    if len(gaps) < unknowns:
+    if len(set(gaps)) < unknowns:
         raise InputError(
-            f"the fit must have at least {unknowns} reading(s) of gap_mm and flux_mT; "
-            f"instead received {len(gaps)}"
+            f"the fit must have readings of flux_mT at {unknowns} or more different "
+            f"gap_mm; instead received {len(set(gaps))}"
         )
     if np.any(gaps <= 0.0):
         raise InputError(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from magbend.core.door import file_below, real_path
 from magbend.core.errors import ConfigError, InputError
 from magbend.core.files import output_file, output_folder, write_bytes
 from magbend.core.specimen_file import (
@@ -210,3 +211,20 @@ def test_what_would_steer_a_terminal_or_the_reader_is_one_sentence(
     path.write_text(text)
     with pytest.raises(ConfigError, match=match):
         read_specimen(path)
+
+
+def test_a_strangers_name_leads_to_a_file_below_or_to_none(tmp_path: Path) -> None:
+    folder = tmp_path / "here"
+    (folder / "deeper").mkdir(parents=True)
+    for name in ("a.csv", "deeper/b.csv", "../outside.csv"):
+        (folder / name).write_text("x")
+    assert file_below(folder, "a.csv") == folder / "a.csv"
+    assert file_below(folder, "deeper/../deeper/b.csv") == folder / "deeper/b.csv"
+    for name in ("../outside.csv", "deeper", "", "n" * 5000, "a\0.csv", "/etc/passwd"):
+        assert file_below(folder, name) is None
+    if os.name == "posix":
+        (folder / "ring").symlink_to("ring")
+        (folder / "out").symlink_to("../outside.csv")
+        assert file_below(folder, "ring") is None
+        assert file_below(folder, "out") is None
+        assert real_path(folder / "ring") == folder / "ring"

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,17 @@ def test_a_specimen_may_stand_in_the_plan(plan_file: Path) -> None:
     assert read_plan(plan_file).specimen.length_mm == 12.0
     plan_file.write_text(text + inline.replace("side_mm", "side") + section)
     with pytest.raises(ConfigError, match=r"line \d+: unknown key 'specimen.side'; th"):
+        read_plan(plan_file)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links are of POSIX")
+@pytest.mark.parametrize("name", ["specimen.toml", "rig.toml"])
+def test_a_ring_of_links_is_a_file_that_cannot_be_read(
+    plan_file: Path, name: str
+) -> None:
+    plan_file.with_name(name).unlink()
+    plan_file.with_name(name).symlink_to(name)
+    with pytest.raises(ConfigError, match=f"{name}: cannot be read"):
         read_plan(plan_file)
 
 

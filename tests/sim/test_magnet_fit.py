@@ -126,6 +126,18 @@ def test_one_wrong_reading_does_not_blame_the_others() -> None:
     assert [verdict == "ok" for verdict in verdicts] == [True, False, True, True, True]
 
 
+def test_a_reading_given_again_to_its_last_digit_makes_nothing_surer() -> None:
+    once = fit_magnet([70.0, 60.0, 50.0], [38.0, 50.0, 66.0])
+    twice = fit_magnet([70.0, 60.0, 50.0] * 2, [38.0, 50.0, 66.0] * 2)
+    assert twice.remanence_95_T == pytest.approx(once.remanence_95_T)
+    assert np.isnan(fit_magnet([70.0] * 3, [38.0] * 3).remanence_sd_T)
+
+
+def test_readings_at_one_gap_tell_no_offset() -> None:
+    with pytest.raises(InputError, match="2 or more different gap_mm"):
+        fit_magnet([70.0] * 3, [38.0, 38.0, 39.0], free_offset=True)
+
+
 def test_one_reading_has_no_uncertainty_of_its_own() -> None:
     fit = fit_magnet([60.0], [50.0])
     assert np.isnan(fit.remanence_sd_T)
