@@ -32,10 +32,10 @@ def clamped(face: float, depth: float, shade: float = 0.0) -> tuple[np.ndarray, 
     )
 
 
-def lines_at(grey: np.ndarray, curve: Curve) -> ClampLines:
+def lines_at(grey: np.ndarray, curve: Curve, blur=1.0, **options) -> ClampLines:
     return find_clamp(
-        grey, curve, expected=-5.0, width=20.0, blur=1.0, contrast=PAPER - ROD,
-        reach=20.0,
+        grey, curve, expected=-5.0, width=20.0, blur=blur, contrast=PAPER - ROD,
+        reach=20.0, **options,
     )  # fmt: skip
 
 
@@ -69,3 +69,53 @@ def test_a_short_line_in_grain_moves_the_root_little():
         off.append([between(face, front, lines) + 5.0, front + 5.0])
     root, front_alone = np.sqrt(np.mean(np.square(off), axis=0))
     assert root < 1.2 * front_alone
+
+
+def test_the_blur_of_the_front_steadies_the_place_of_the_face():
+    """A lens blurs both alike; the face alone confounds its blur with its place."""
+    grey, curve = clamped(0.3, 20.0)
+    grey = cv2.GaussianBlur(grey, (0, 0), 1.2)
+    places, ratios = [], []
+    for seed in range(32):
+        grain = np.random.default_rng(seed).normal(scale=0.02, size=grey.shape)
+        lines = lines_at(grey + grain.astype(np.float32), curve, optics=(1.6, 1.6))
+        assert lines.face is not None
+        assert lines.front is not None
+        places.append(lines.face.s + 5.0)
+        ratios.append(lines.face.blur / lines.front.blur)
+    assert np.std(ratios) < 0.1  # 0.21 by itself
+    assert np.sqrt(np.mean(np.square(places))) < 0.4  # 0.53 by itself
+
+
+def test_what_moved_along_the_rod_is_not_held_to_the_blur_of_its_sides():
+    grey, curve = clamped(0.3, 20.0)
+    moved = cv2.blur(grey, (5, 1))
+    lines = lines_at(moved, curve, blur=1.75, optics=(1.05, 1.75))
+    assert lines.face is not None
+    assert lines.front is not None
+    assert lines.face.blur == pytest.approx(lines.front.blur, rel=0.15)
+    assert lines.face.s == pytest.approx(-5.0, abs=0.1)
+
+
+@pytest.mark.parametrize("radius", [150.0, -150.0])
+def test_a_front_askew_to_a_bent_rod_is_met_where_its_axis_meets_it(radius):
+    """Lanes beside a bent rod are no parallels: the straight line is none on them."""
+    slope = 0.15
+    x, y = np.meshgrid(np.arange(260.0), np.arange(220.0))
+    into = 1.0 / (1.0 + np.exp((x - 60.0 - slope * (y - 110.0)) / 0.6))
+    away = np.abs(np.hypot(x - 60.0, y - 110.0 - radius) - abs(radius))
+    paper = PAPER + (ROD - PAPER) / (1.0 + np.exp((away - 8.0) / 0.6))
+    light = (paper + (TOP - paper) * into).astype(np.float32)
+    s = np.linspace(0.0, 120.0, 121)
+    theta = s / radius
+    points = np.column_stack(
+        [60.0 + radius * np.sin(theta), 110.0 + radius * (1.0 - np.cos(theta))]
+    )
+    curve = Curve(s=s, points=points, theta=theta, kappa=np.full(121, 1.0 / radius))
+    front = find_clamp(
+        light, curve, expected=0.0, width=16.0, blur=1.0, contrast=PAPER - ROD,
+        reach=10.0,
+    ).front  # fmt: skip
+    assert front is not None
+    assert front.s == pytest.approx(0.0, abs=0.05)
+    assert front.skew == pytest.approx(slope, abs=5e-3)

@@ -9,6 +9,8 @@ along the rod; `extract` corrects for that, knowing the camera.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +43,13 @@ DARKEST, DIMMED = 0.15, 0.8
 """How far from the rod's light to the paper's what goes on behind a root may be; and in
 a mix of colours, in which a clamp's shade on the rod takes from its colour and a dark
 clamp may look like paper."""
+
+_LENS = 0.05
+"""Deviation of a blur in one picture from what others tell of it, in itself."""
+
+_PARALLEL = 0.3
+"""Slopes by which the two lines, both in one plane, may differ: else it is no end that
+is seen on the rod, as where a lamp from one side lights but half of it."""
 
 _LEAST_PX = 0.8
 """Blur for which a lane's own levels are sought at least: fewer samples do not tell."""
@@ -98,6 +107,7 @@ def find_clamp(
     blur: float,
     contrast: float,
     reach: float,
+    optics: Sequence[float] = (),
     sign: float = 1.0,
     fine: bool = True,
 ) -> ClampLines:
@@ -115,6 +125,8 @@ def find_clamp(
         Width of the rod and standard deviation of the blur, px.
     contrast : float
         Light of paper minus light of rod.
+    optics : sequence of float
+        What the rod's sides and its tip tell of the blur, px: one lens blurs all alike.
     sign : float
         -1 for a light rod.
     fine : bool
@@ -128,13 +140,6 @@ def find_clamp(
     near = clear_of(blur)
     span = reach + near + max(8.0, SPAN * blur)
     wide = max(blur, _LEAST_PX)
-    face = fit_step(
-        _face(grey, curve, expected, span, width, near, contrast, reach, sign),
-        blur=blur, inner=SPAN * blur, outer=_CLAMP_SPAN * blur, fine=fine,
-    )  # fmt: skip
-    if face is not None:
-        sigma = _ALIKE * face.sigma
-        face = face._replace(s=-face.s, skew=-face.skew, sigma=sigma)
     front = fit_step(
         _front(
             grey, curve, expected, span, (_BESIDE if fine else _BESIDE[::2]) * width,
@@ -142,7 +147,30 @@ def find_clamp(
         ),
         blur=blur, inner=_CLAMP_SPAN * wide, outer=SPAN * wide, own=True, fine=fine,
     )  # fmt: skip
+    face = fit_step(
+        _face(grey, curve, expected, span, width, near, contrast, reach, sign),
+        blur=blur, inner=SPAN * blur, outer=_CLAMP_SPAN * blur, fine=fine,
+        told=_told_blur(front, optics),
+    )  # fmt: skip
+    if face is not None:
+        sigma = _ALIKE * face.sigma
+        face = face._replace(s=-face.s, skew=-face.skew, sigma=sigma)
+        if fine and front is not None and abs(face.skew - front.skew) > _PARALLEL:
+            face = None
     return ClampLines(face=face, front=front)
+
+
+def _told_blur(front: EndFace | None, optics: Sequence[float]) -> tuple[float, float]:
+    """Return the blur that is told for the face of a clamp, and its deviation, px.
+
+    The face, as short as the rod is wide, hardly knows its blur itself. Where motion or
+    a lens out of focus blurs sides, tip and front unlike, it is told less.
+    """
+    told = [*optics, front.blur] if front is not None and front.blur else [*optics]
+    if not told:
+        return 0.0, math.inf
+    middle = median(np.array(told))
+    return middle, math.hypot(_LENS * middle, float(np.std(told)))
 
 
 @njit(cache=True)
@@ -182,9 +210,12 @@ def _front(
     # A side on which nothing rises does not count as one whose lanes do not cross.
     first = count if np.isnan(left) else 0
     last = count if np.isnan(right) else across.size
+    # The normals of a bent rod meet: along it, a straight line askew rises so far.
+    bend = np.interp(expected, curve.s, curve.kappa)
     crossed: Crossed = line_through(
-        light[first:last], s, across[first:last], crossing[first:last]
-    )
+        light[first:last], s, (across / (1.0 - bend * across))[first:last],
+        crossing[first:last],
+    )  # fmt: skip
     return crossed
 
 

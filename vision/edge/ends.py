@@ -86,7 +86,7 @@ def _clamp_lines(
         return find_clamp(
             grey, state.curve, expected=0.5 * (low + high), width=state.width,
             blur=state.clamp_blur or state.blur, contrast=contrast,
-            reach=0.5 * (high - low), sign=sign, fine=fine,
+            reach=0.5 * (high - low), optics=state.optics, sign=sign, fine=fine,
         )  # fmt: skip
 
     width, contrast = state.width, seen.edges.contrast
@@ -128,7 +128,7 @@ def _in_own_light(state: State, *, fine: bool) -> ClampLines:
         return find_clamp(
             image, state.curve, expected=expected, width=state.width,
             blur=state.clamp_blur or state.blur, contrast=STEP, reach=reach,
-            fine=fine,
+            optics=state.optics, fine=fine,
         )  # fmt: skip
 
     return ClampLines(face=seen_in(light.rod).face, front=seen_in(light.paper).front)

@@ -69,6 +69,11 @@ class State:
     photo: Photo | None = None
     clamp_light: ClampLight | None = None
 
+    @property
+    def optics(self) -> tuple[float, ...]:
+        """What sides and tip, as far as it was fitted, tell of the blur, px."""
+        return (self.blur, self.tip_blur) if self.tip_blur else (self.blur,)
+
 
 @dataclass(frozen=True, slots=True)
 class Seen:

@@ -38,7 +38,7 @@ _LEAST_PIVOT = 1e-6
 
 def fit_step(
     seen: Crossed, *, blur: float, inner: float, outer: float, own: bool = False,
-    fine: bool = True,
+    fine: bool = True, told: tuple[float, float] = (0.0, math.inf),
 ) -> EndFace | None:  # fmt: skip
     """Return a line moved to where a blurred step fits the lanes best.
 
@@ -65,6 +65,10 @@ def fit_step(
         step's height, and less the farther it is off.
     fine : bool
         Whether to fit; else the line through the crossings will do.
+    told : tuple of float
+        What others tell of the blur, px, and its standard deviation: a line that
+        hardly knows its blur does not know its place either, where its levels are not
+        alike for long.
 
     Returns
     -------
@@ -76,14 +80,15 @@ def fit_step(
         return None
     if not fine:
         return line
-    found, white = _fitted(seen, blur, inner, outer, own)
+    found, white = _fitted(seen, blur, inner, outer, own, told)
     return _to_whole_step(seen, found, blur, inner, outer, white) if white else found
 
 
 @njit(cache=True)
 def _fitted(
-    seen: Crossed, blur: float, inner: float, outer: float, own: bool
-) -> tuple[EndFace, float]:
+    seen: Crossed, blur: float, inner: float, outer: float, own: bool,
+    told: tuple[float, float],
+) -> tuple[EndFace, float]:  # fmt: skip
     """Return the line fitted, and 1 or -1 where it lies beside what is white, else 0.
 
     Lanes of a light rod are negative: white lies before the line then.
@@ -91,8 +96,10 @@ def _fitted(
     line, s = seen.line, seen.s
     wide = np.hypot(blur, line.scatter)
     light, across = _near(seen)
+    samples = len(across) * (inner + outer) / (s[1] - s[0])
+    optics = (told[0], np.sqrt(samples) * told[1])
     place, skew, fitted, rise, known, off, uneven = _fit_step(
-        light, s, across, line.s, line.skew, wide, inner, outer, own
+        light, s, across, line.s, line.skew, wide, inner, outer, own, optics
     )
     if not (abs(place - line.s) < 2.0 * wide and np.any(known != 0.0)):
         # No step fits here: what was crossed may be anything as blurred as this.
@@ -172,7 +179,7 @@ def _to_whole_step(
 @njit(cache=True, error_model="numpy")
 def _fit_step(
     light: Array, s: Array, across: Array, place: float, skew: float, blur: float,
-    inner: float, outer: float, own: bool,
+    inner: float, outer: float, own: bool, optics: tuple[float, float],
 ) -> tuple[float, float, float, Array, Array, Array, float]:  # fmt: skip
     """Gauss-Newton for place and skew of a line and the blur, each group's levels out.
 
@@ -183,13 +190,13 @@ def _fit_step(
     groups = len(light) if own else 1
     least, most = _SHARPER * blur, _SOFTER * blur
     weight, known, off = np.ones(groups), np.zeros(groups), np.zeros(groups)
-    equations, heights = np.zeros((groups, 3, 4)), np.zeros((groups, 4))
+    equations, heights = np.zeros((groups, 4, 4)), np.zeros((groups, 4))
     step, uneven = np.zeros(3), 0.0
     for _ in range(_ROUNDS_OWN if own else _ROUNDS):
         _fill(light, s, across, place, skew, blur, inner, outer, equations, heights)
         rise: Array = heights[:, 3].copy()
         for _again in range(2):  # the step changes the levels
-            if not _solve(equations, weight, rise, step):
+            if not _solve(equations, weight, rise, blur, optics, step):
                 return place, skew, blur, rise, np.zeros(groups), off, uneven
             rise = heights[:, 3] - rise * (heights[:, :3].copy() @ step)
         place, skew = place + step[0], skew + step[1]
@@ -205,21 +212,30 @@ def _fit_step(
     if own:
         farther = _FARTHER * outer
         _fill(light, s, across, place, skew, blur, inner, farther, equations, heights)
-        if _solve(equations, weight, rise, step):
+        if _solve(equations, weight, rise, blur, optics, step):
             uneven = abs(step[0])
     return place, skew, blur, rise, known, off, uneven
 
 
 @njit(cache=True)
-def _solve(equations: Array, weight: Array, rise: Array, step: Array) -> bool:
+def _solve(
+    equations: Array, weight: Array, rise: Array, blur: float,
+    optics: tuple[float, float], step: Array,
+) -> bool:  # fmt: skip
     """Fill in the step that all groups together ask for; False where none does."""
-    total = np.zeros((3, 4))
+    total, left = np.zeros((3, 4)), 0.0
     for g in range(weight.size):
         scale = weight[g] * rise[g]
-        total[:, :3] += scale * rise[g] * equations[g, :, :3]
-        total[:, 3] += scale * equations[g, :, 3]
+        total[:, :3] += scale * rise[g] * equations[g, :3, :3]
+        total[:, 3] += scale * equations[g, :3, 3]
+        left += weight[g] * equations[g, 3, 3]
     if not np.linalg.det(total[:, :3]) > 0.0:
         return False
+    step[:] = np.linalg.solve(total[:, :3].copy(), total[:, 3].copy())
+    left -= float(np.sum(step * total[:, 3]))
+    sure = _ALIKE * max(left, 0.0) / optics[1] ** 2
+    total[2, 2] += sure
+    total[2, 3] += sure * (optics[0] - blur)
     step[:] = np.linalg.solve(total[:, :3].copy(), total[:, 3].copy())
     return True
 
@@ -229,11 +245,11 @@ def _fill(
     light: Array, s: Array, across: Array, place: float, skew: float, blur: float,
     inner: float, outer: float, equations: Array, heights: Array,
 ) -> None:  # fmt: skip
-    """Fill in normal equations of each group, (groups, 3, 4), and heights, (groups, 4).
+    """Fill in normal equations of each group, (groups, 4, 4), and heights, (groups, 4).
 
-    Of place, skew and blur, times the step's height; the levels, and the outer one's
-    slope, are eliminated. The height is the last number less the other three times
-    these.
+    Of place, skew and blur, times the step's height, and of the light, whose square is
+    what is left; the levels, and the outer one's slope, are eliminated. The height is
+    the last number less the other three times these.
     """
     change, full = np.empty(7), np.zeros((7, 7))
     for i in range(across.size):
@@ -259,7 +275,7 @@ def _fill(
         if len(equations) > 1 or i == across.size - 1:
             g = min(i, len(equations) - 1)
             _eliminate(full, heights[g])
-            for a in range(3):
+            for a in range(4):
                 for b in range(4):
                     equations[g, a, b] = full[3 + min(a, b), 3 + max(a, b)]
             full[:] = 0.0
