@@ -29,12 +29,10 @@ SCENE = Scene(
 )  # fmt: skip
 
 
-def measured(scene, camera=CAMERA):
+def measured(scene, camera=CAMERA, **known):
     picture = render_scene(scene, camera, np.random.default_rng(3))
-    found = extract(
-        as_photo(picture), camera, rod_height_mm=HEIGHT, clamp_height_mm=4.0,
-        is_round=False,
-    )  # fmt: skip
+    known = {"clamp_height_mm": 4.0, "is_round": False} | known
+    found = extract(as_photo(picture), camera, rod_height_mm=HEIGHT, **known)
     assert found.ok, found.reason
     return found
 
@@ -111,3 +109,10 @@ def test_a_bent_rod_that_moved_by_its_width_is_in_doubt():
     moved = moved_aside(9.0)
     assert abs(moved.width_mm - SIDE) < moved.width_sd_mm
     assert {"blurred", "width_uneven"} <= set(moved.flags)
+
+
+def test_a_limb_that_may_be_round_is_no_step(plain):
+    untold = measured(SCENE, is_round=None)
+    assert untold.tip_mm == pytest.approx(plain.tip_mm, abs=1e-9)
+    assert untold.length_sd_mm > 1.4 * plain.length_sd_mm
+    assert untold.width_sd_mm > 1.4 * plain.width_sd_mm

@@ -19,32 +19,16 @@ from ..camera.calibration import Calibration
 from ..edge.crossings import EndFace
 from ..edge.wall_light import WALL_PLACES
 from ..find.ground import View
-from .deviations import EDGE_MM, is_dark, white_px
+from .deviations import EDGE_MM, direction_rad, turned_by_shade, white_px
 from .refine import Refined
 from .setting import Setting
 from .told_clamp import ToldClamp, surer_direction
 
 Array = NDArray[np.float64]
 
-SUPPLE, SUPPLE_FREEDOM = 1.2, 5.0
-"""Factor on the fit's own deviation of the direction at the clamp for a curve of so
-many free numbers, and with the root of more: they were chosen by the same points."""
-BENT_BACK, BACK, BENT = 1.5, 0.25, 0.01
-"""Factor for a rod that is bent both ways, the lesser way by this share at least, and
-by so much over its width: no single force makes that, and what is known of moments
-helps less at the root."""
-TURN_SHADE, TURN_WALL, TURN_PALE_WALL = 0.35, 0.05, 0.4
-"""Shares of the shade's pull, and of the side wall that is seen (on a rod that is not
-dark: its light is not known), by which the midline is off all along, with one sign."""
 LONE_DEG = 1.0
 """Turn by shade beside the root above which the rod says nothing of its direction: what
 the front of the clamp tells, which may be the shade's, is then unchecked."""
-DRIFT_SHADE, DRIFT_RELIT, DRIFT_WHITE, DRIFT_REACH = 0.15, 2.0, 0.03, 1.5
-DRIFT_BENT, DRIFT_PALE_BENT = 0.17, 0.4
-"""Errors that neighbours share over so many widths: of the shade's pull; of what an
-edge may move where the light on the rod changes, as in the shade of its clamp; of the
-blur where the paper is white; and, px, by the angle that a rod turns over its width,
-for then the light on its sides changes."""
 APART = 3.0
 """Deviations by which rod and front may differ before one of them is doubted."""
 _BASE_PX = 20.0
@@ -95,7 +79,7 @@ def fit_clamp(
     s = np.linspace(root.s, refined.tip.s, WALL_PLACES)
     view = setting.view(camera, *curve.at(s))
     wall = setting.wall_px(view, np.interp(s, curve.s, refined.width))
-    rod_sd = _rod_sd(refined, np.interp(curve.s, s, wall), seen_in)
+    rod_sd = direction_rad(refined, np.interp(curve.s, s, wall), seen_in)
     heading = float(view.heading[0])
     turn, turn_sd = _front(refined, setting, camera, heading)
     # y runs down in the picture: there the heading turns the other way.
@@ -111,7 +95,7 @@ def fit_clamp(
         shift[0], covariance = 0.0, np.diag([place_sd, math.radians(sd_deg)]) ** 2
     if root.lines_differ or apart > APART:
         flags = (*flags, "clamp_lines_differ")
-    if _turned_by_shade(refined) > math.radians(LONE_DEG):
+    if turned_by_shade(refined) > math.radians(LONE_DEG):
         flags = (*flags, "direction_doubtful")
     return ClampFit(
         s=root.s + shift[0], angle_deg=angle_deg, covariance=covariance, flags=flags
@@ -181,32 +165,3 @@ def _across(refined: Refined, line: EndFace) -> Array:
     along = np.array([math.cos(theta[0]), math.sin(theta[0])])
     step = _BASE_PX * (np.array([-along[1], along[0]]) + line.skew * along)
     return points + np.array([[-1.0], [1.0]]) * step
-
-
-def _rod_sd(refined: Refined, wall: Array, seen_in: View) -> float:
-    """Return the standard deviation of the rod's own direction at a place, rad.
-
-    `wall` is how wide the side wall is seen, px, positive on the left.
-    """
-    fit, width = refined.fit, float(refined.width[0])
-    facing, bent = (
-        (TURN_WALL, DRIFT_BENT) if is_dark(seen_in)
-        else (TURN_PALE_WALL, DRIFT_PALE_BENT)
-    )  # fmt: skip
-    drift = np.hypot(bent * fit.curve.kappa * width, DRIFT_SHADE * refined.shaded)
-    drift = np.hypot(drift, DRIFT_RELIT * refined.relit)
-    white = DRIFT_WHITE * refined.saturated * refined.blur
-    both = sorted((fit.curve.kappa.max(), -fit.curve.kappa.min()))
-    free = BENT_BACK if both[0] > max(BACK * both[1], BENT / width) else 1.0
-    supple = SUPPLE * math.sqrt(fit.freedom / SUPPLE_FREEDOM)
-    return math.hypot(
-        free * supple * fit.sigma_theta[0],
-        free * fit.turned(np.hypot(drift, white), DRIFT_REACH * width),
-        _turned_by_shade(refined),
-        facing * fit.lever @ wall,
-    )
-
-
-def _turned_by_shade(refined: Refined) -> float:
-    """Return how far shade beside the root may turn the rod's own direction, rad."""
-    return TURN_SHADE * abs(float(refined.fit.lever @ refined.shaded))

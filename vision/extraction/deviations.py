@@ -1,7 +1,10 @@
-"""How well length, tip, width and the clamp's place are known, in mm.
+"""How well length, tip, width and the rod's direction are known: a list of causes.
 
 What is measured in pixels has the deviations of its fit; the frame hangs on the clamp's
-place and direction; everything scales with the millimetres of a pixel.
+place (`root`) and direction; everything scales with the millimetres of a pixel. The
+numbers are the likeliest for the errors on working scenes of the project's renderer
+and on drawings by another; most are shares of something that a picture shows, so that
+they vanish where it does.
 """
 
 from __future__ import annotations
@@ -22,29 +25,56 @@ from .setting import Setting
 
 Array = NDArray[np.float64]
 
-EDGE_MM = 0.001
-"""Doubt of where a clamp or a rod ends, or its sides: no edge is sharper."""
-TIP_BLUR = 0.01
-"""Doubt of an end, in its blurs."""
-WIDTH_BLUR, WIDTH_SHADE, WIDTH_GROWTH = 0.02, 0.6, 3.0
-"""Doubt of a width: in blurs, which are no Gaussian's; the share of a shade's pull that
-is left in it; and over what edges differ with closer levels, as beside a limb that is
-rounded, or where a camera sharpened its picture."""
+EDGE_MM = 0.0005
+"""Of every end, side and line: no edge is sharper."""
+
+ALIKE_TIP = 3.0
+"""Of an end, over what its lanes scatter by: they share shade, samples and levels."""
+FACE_SEEN, FACE_HIDDEN = 0.05, 0.01
+"""And in widths of its face: where the camera sees it, or it is not dark, so that its
+light is not known; where its lower edge is hidden."""
+PALE_TIP = 0.25
+"""And in blurs, of a rod that is not dark."""
+
+LIMB = 0.09
+"""Of either side and of an end, in blurs, unless the rod is told to be square: the limb
+of a round one turns from the light, which is no step."""
+
+WIDTH_BLUR, WIDTH_SHADE, WIDTH_GROWTH = 0.01, 0.6, 1.2
+"""Of a width: in blurs, which are no Gaussian's; the share of a shade's pull that is
+left in it; and over what edges differ with closer levels, as where a camera sharpened
+its picture."""
 WIDTH_FELT = 6.0
 """And in widths times the fourth power of the blur in widths: by so little do width and
 blur change a profile differently, and so much is a lens out of focus no Gaussian."""
-FACE_SEEN, FACE_HIDDEN = 0.18, 0.02
-"""Doubt of where an end is, in widths of its face where the camera sees it (it has
-another grey value than the top), or where its lower edge is hidden."""
 SIDE_FACE, PALE_FACE, WIDTH_FACE = 0.025, 0.5, 0.01
-"""Doubt of where a side ends whose face is seen, in widths of that face: on a dark rod,
-one that is not dark, and what of it is left in a dark rod's width."""
+"""Of where a side ends whose face is seen, in widths of that face: on a dark rod, one
+that is not dark, and what of it is left in a dark rod's width."""
 PALE_PX = 0.2
-"""Doubt of a width that is not dark, whatever is seen of its sides."""
+"""Of a width that is not dark, whatever is seen of its sides."""
+
+SUPPLE, SUPPLE_FREEDOM = 1.25, 5.0
+"""Of the direction at the clamp, over the fit's own, for a curve of so many free
+numbers, and with the root of more: they were chosen by the same points."""
+BENT_BACK, BACK, BENT = 1.5, 0.25, 0.01
+"""Factor for a rod that is bent both ways, the lesser way by this share at least, and
+by so much over its width: no single force makes that, and what is known of moments
+helps less at the root."""
+TURN_SHADE, TURN_WALL, TURN_PALE_WALL = 0.35, 0.065, 0.4
+"""Shares of the shade's pull, and of the side wall that is seen (on a rod that is not
+dark: its light is not known), by which the midline is off all along, with one sign."""
+DRIFT_REACH, DRIFT_BENT, DRIFT_PALE_BENT = 1.5, 0.09, 0.2
+"""Errors that neighbours share over so many widths: px, by the angle that a rod turns
+over its width, for then the light on its sides changes;"""
+DRIFT_RELIT, DRIFT_WHITE, USUAL, NEAR = 1.0, 0.03, 0.9, 4.0
+"""of what an edge may move where the light on the rod changes beside its clamp, within
+so many widths, by more than on this part of the rest; of the blur where the paper is
+white."""
+
 WHOLE, CUT_OFF = 0.05, 0.45
-"""Doubt of an edge beside paper that is white, in px and again in blurs where all its
-light was fitted; else in blurs. With 1.5 times what makes it white, half level of what
-is left lies 0.43 blurs off."""
+"""Of an edge beside paper that is white, in px and again in blurs where all its light
+was fitted; else in blurs. With 1.5 times what makes it white, half level of what is
+left lies 0.43 blurs off."""
 
 
 def is_dark(seen_in: View) -> bool:
@@ -107,27 +137,9 @@ def with_deviations(
     to_mm = np.array([1.0 / float(view.along[0]), 1.0])
     clamped = clamped * np.outer(to_mm, to_mm)
     clamp = math.sqrt(clamped[0, 0])
-    rise = float(view.rise_along[-1])
-    seen = rise < 0.0 or not dark
-    face = rise * (FACE_SEEN if seen else FACE_HIDDEN)
-    along = float(view.along[-1])
-    tip = math.hypot(
-        refined.tip.sigma,
-        TIP_BLUR * refined.blur,
-        face * result.width_mm,
-        white_px(refined),
-        EDGE_MM * along,
-    ) / along  # fmt: skip
-    wall = WIDTH_FACE if dark else PALE_FACE
-    width = math.hypot(
-        median(refined.sigma_width) / math.sqrt(max(1.0, _widths(refined))),
-        WIDTH_BLUR * refined.blur if dark else PALE_PX,
-        WIDTH_SHADE * median(refined.shaded),
-        WIDTH_GROWTH * refined.growth,
-        wall * median(np.abs(view.rise_across)) * result.width_mm,
-        2.0 * white_px(refined),
-        WIDTH_FELT * refined.blur**4 / refined.typical_width**3,
-    ) / median(view.across)
+    limb = LIMB * refined.blur if setting.is_round is not False else 0.0
+    tip = _tip_px(result, refined, view, dark=dark, limb=limb) / float(view.along[-1])
+    width = _width_px(result, refined, view, dark=dark, limb=limb) / median(view.across)
     untold = math.hypot(EDGE_MM, _section_mm(result, view, setting))
     return replace(
         result,
@@ -135,6 +147,39 @@ def with_deviations(
         width_sd_mm=math.hypot(width, untold, scale * result.width_mm),
         clamp_sd_mm=clamp,
         tip_sd_mm=_tip_sd_mm(result, faces / view.along, clamped, tip, scale),
+    )
+
+
+def _tip_px(
+    result: Measurement, refined: Refined, view: LocalView, *, dark: bool, limb: float
+) -> float:
+    """Return the deviation of where the end is, px."""
+    tip, rise = refined.tip, float(view.rise_along[-1])
+    face = FACE_SEEN if rise < 0.0 or not dark else FACE_HIDDEN
+    return math.hypot(
+        ALIKE_TIP * tip.sigma,
+        face * rise * result.width_mm,
+        0.0 if dark else PALE_TIP * refined.blur,
+        limb,
+        white_px(refined),
+        EDGE_MM * float(view.along[-1]),
+    )
+
+
+def _width_px(
+    result: Measurement, refined: Refined, view: LocalView, *, dark: bool, limb: float
+) -> float:
+    """Return the deviation of the width between the edges, px."""
+    wall = WIDTH_FACE if dark else PALE_FACE
+    return math.hypot(
+        median(refined.sigma_width) / math.sqrt(max(1.0, _widths(refined))),
+        WIDTH_BLUR * refined.blur if dark else PALE_PX,
+        WIDTH_SHADE * median(refined.shaded),
+        WIDTH_GROWTH * refined.growth,
+        wall * median(np.abs(view.rise_across)) * result.width_mm,
+        2.0 * limb,
+        2.0 * white_px(refined),
+        WIDTH_FELT * refined.blur**4 / refined.typical_width**3,
     )
 
 
@@ -182,3 +227,48 @@ def _tip_sd_mm(
     )
     sd_x, sd_y = np.sqrt(np.sum(parts**2, axis=0) + frame)
     return float(sd_x), float(sd_y)
+
+
+def direction_rad(refined: Refined, wall: Array, seen_in: View) -> float:
+    """Return the deviation of the rod's own direction at a place beside its clamp.
+
+    Parameters
+    ----------
+    refined : Refined
+        The rod in pixels.
+    wall : ndarray, shape (n,)
+        How wide its side wall is seen, px, positive on the left.
+    seen_in : View
+        The light it is seen in.
+    """
+    fit, width = refined.fit, float(refined.width[0])
+    facing, bent = (
+        (TURN_WALL, DRIFT_BENT) if is_dark(seen_in)
+        else (TURN_PALE_WALL, DRIFT_PALE_BENT)
+    )  # fmt: skip
+    drift = np.hypot(
+        bent * fit.curve.kappa * width, DRIFT_RELIT * _lit_at_clamp(refined, width)
+    )
+    white = DRIFT_WHITE * refined.saturated * refined.blur
+    both = sorted((fit.curve.kappa.max(), -fit.curve.kappa.min()))
+    free = BENT_BACK if both[0] > max(BACK * both[1], BENT / width) else 1.0
+    supple = SUPPLE * math.sqrt(fit.freedom / SUPPLE_FREEDOM)
+    return math.hypot(
+        free * supple * fit.sigma_theta[0],
+        free * fit.turned(np.hypot(drift, white), DRIFT_REACH * width),
+        turned_by_shade(refined),
+        facing * fit.lever @ wall,
+    )
+
+
+def turned_by_shade(refined: Refined) -> float:
+    """Return how far shade beside the root may turn the rod's own direction, rad."""
+    return TURN_SHADE * abs(float(refined.fit.lever @ refined.shaded))
+
+
+def _lit_at_clamp(refined: Refined, width: float) -> Array:
+    """Return by how much more the light on a rod changes beside its clamp, px."""
+    s = refined.fit.curve.s
+    rest = refined.relit[s > s[0] + NEAR * width]
+    usual = float(np.quantile(rest, USUAL)) if rest.size else 0.0
+    return np.maximum(refined.relit - usual, 0.0)

@@ -23,11 +23,14 @@ from .setting import UNKNOWN_CLAMP_MM, Setting
 HIDDEN_MM = 0.05
 """What part of the root a clamp of unknown height may hide before that is named."""
 
-BORDER_PX, CARRIED, BETWEEN, SMEARED = 0.3, 0.01, 0.3, 1.3
+BORDER_PX, CARRIED, BETWEEN, SMEARED = 0.3, 0.004, 0.2, 1.3
 """Standard deviation of a place: px, of where a rod enters the picture; as shares of
 how far a line is carried to the height of the axis, of how far two lines are apart, and
 of what blurs a line more than the rod's sides and its tip: the front of a shade, seen
 as one line with the clamp's (errors of 0.6 to 2 times that on drawings)."""
+
+BROKEN_MM = 0.05
+"""Doubt of how high the top edge is that hides a root: edges of clamps are broken."""
 
 ROUND, ROUND_CARRIED = 0.3, 0.7
 """How far the front of a chuck, a disc, bulges toward the tip where it is seen aslant,
@@ -93,7 +96,7 @@ def root_place(
         hidden = hidden_px(refined, setting, rise) / math.sqrt(3.0)
         place, line = _hidden_root(refined, ends, setting), front or face
         carried = 0.0 if line is None else place - line.s
-        sd = _sd(refined, line, share * carried, hidden)
+        sd = _sd(refined, line, share * carried, BROKEN_MM * rise, hidden)
         return RootPlace(s=place, sd=sd, hidden=hidden)
     if is_round and face is not None:
         # Its rim is at no height that is known; the rod's own lanes are.
