@@ -11,7 +11,7 @@ from __future__ import annotations
 import hmac
 from collections.abc import Callable
 from http.cookies import CookieError, SimpleCookie
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import parse_qs
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.responses import PlainTextResponse, RedirectResponse
@@ -77,10 +77,10 @@ class Guard:
         if not self._is_ours(host):
             return f"this panel does not answer to the name {host!r}"
         origin = headers.get("origin")
-        if origin is not None:
-            parts = urlsplit(origin)
-            if parts.scheme not in ("http", "https") or parts.netloc.lower() != host:
-                return f"this panel takes nothing from the page {origin!r}"
+        if origin is not None and origin.lower() not in (
+            f"http://{host}", f"https://{host}"
+        ):  # fmt: skip
+            return f"this panel takes nothing from the page {origin!r}"
         if scope["type"] == "websocket":
             return "" if origin is not None else "a socket needs an Origin"
         if scope["method"] not in ("GET", "HEAD") and not headers.get(CLIENT_HEADER):

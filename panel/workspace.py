@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..core.checks import shown
 from ..core.door import real_path
 from ..core.errors import ConfigError, InputError, MagbendError
 from ..core.json import read_json
@@ -105,10 +106,12 @@ class Workspace:
         InputError
             If there is no such run.
         """
-        folder = self.runs_path / name
-        if Path(name).name != name or name.startswith(".") or not folder.is_dir():
-            raise InputError(f"there is no run {name!r} in {self.runs_path}")
-        return folder
+        # The names that are there, asked one by one: none is too long or leads out.
+        folders = self.runs_path.iterdir() if self.runs_path.is_dir() else ()
+        found = next((one for one in folders if one.name == name), None)
+        if found is None or name.startswith(".") or not found.is_dir():
+            raise InputError(f"there is no run {shown(name)} in {self.runs_path}")
+        return found
 
     def files(self) -> BenchFiles:
         """Return what the files say now."""

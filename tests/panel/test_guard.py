@@ -38,7 +38,8 @@ def test_a_foreign_host_is_refused(panel: Served, host: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "origin", ["https://evil.example", "null", "http://127.0.0.1:1", "file://"]
+    "origin",
+    ["https://evil.example", "null", "http://127.0.0.1:1", "file://", "http://["],
 )
 def test_a_foreign_origin_is_refused(panel: Served, origin: str) -> None:
     status, _, _ = panel.request(
@@ -90,7 +91,8 @@ def handshake(panel: Served, origin: str | None) -> str:
 
 def test_a_file_outside_a_run_is_not_shown(panel: Served) -> None:
     for path in ("/runs/../rig.toml", "/runs/%2e%2e/rig.toml", "/runs/.hidden/x.png",
-                 "/static/../panel.py", "/runs/none/images/a.png"):  # fmt: skip
+                 "/static/../panel.py", "/runs/none/images/a.png",
+                 f"/runs/{'n' * 300}/images/a.png"):  # fmt: skip
         status, _, _ = panel.request("GET", path)
         assert status == 404, path
 
