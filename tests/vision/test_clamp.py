@@ -119,3 +119,16 @@ def test_a_front_askew_to_a_bent_rod_is_met_where_its_axis_meets_it(radius):
     assert front is not None
     assert front.s == pytest.approx(0.0, abs=0.05)
     assert front.skew == pytest.approx(slope, abs=5e-3)
+
+
+@pytest.mark.parametrize(("slope", "seen"), [(0.2, True), (0.7, False)])
+def test_what_ends_aslant_on_a_rod_is_no_clamp(slope, seen):
+    """A lamp lights it from there on; a rod leaves its clamp about squarely."""
+    x, y = np.meshgrid(np.arange(200.0), np.arange(120.0))
+    lit = 1.0 / (1.0 + np.exp((x - 60.0 - slope * (y - 60.0)) / 0.6))
+    rod = 1.0 / (1.0 + np.exp((np.abs(y - 60.0) - 10.0) / 0.6))
+    light = PAPER + (ROD + 0.3 * lit - PAPER) * rod
+    _, curve = clamped(0.3, 20.0)
+    lines = lines_at(light.astype(np.float32), curve)
+    assert (lines.face is not None) == seen
+    assert lines.front is None

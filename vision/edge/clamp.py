@@ -47,9 +47,10 @@ clamp may look like paper."""
 _LENS = 0.05
 """Deviation of a blur in one picture from what others tell of it, in itself."""
 
-_PARALLEL = 0.3
-"""Slopes by which the two lines, both in one plane, may differ: else it is no end that
-is seen on the rod, as where a lamp from one side lights but half of it."""
+_PARALLEL, _ASKEW = 0.3, 0.45
+"""Slopes by which the two lines, both in one plane, may differ, and a line may be off a
+right angle, a camera aslant and a root hidden behind a bend allowed for: else it is no
+end that is seen on the rod, as where a lamp from one side lights but half of it."""
 
 _LEAST_PX = 0.8
 """Blur for which a lane's own levels are sought at least: fewer samples do not tell."""
@@ -155,8 +156,16 @@ def find_clamp(
     if face is not None:
         sigma = _ALIKE * face.sigma
         face = face._replace(s=-face.s, skew=-face.skew, sigma=sigma)
-        if fine and front is not None and abs(face.skew - front.skew) > _PARALLEL:
-            face = None
+    return _square(face, front) if fine else ClampLines(face=face, front=front)
+
+
+def _square(face: EndFace | None, front: EndFace | None) -> ClampLines:
+    """Return the lines without those that no clamp has which a rod leaves squarely."""
+    if front is not None and abs(front.skew) > _ASKEW:
+        front = None
+    along, most = (0.0, _ASKEW) if front is None else (front.skew, _PARALLEL)
+    if face is not None and abs(face.skew - along) > most:
+        face = None
     return ClampLines(face=face, front=front)
 
 
