@@ -290,7 +290,8 @@ GRBL_09 = {
     b"$I": b"[0.9j.20160317:]\r\nok\r\n",
     b"$G": b"[G0 G54 G17 G21 G90 G94 M0 M5 M9 T0 F0. S0.]\r\nok\r\n",
     b"$#": b"ok\r\n",
-    b"$$": b"$0=10 (step pulse, usec)\r\n$100=250.000 (x, step/mm)\r\nok\r\n",
+    b"$$": b"$0=10 (step pulse, usec)\r\n$13=0 (report inches, bool)\r\n"
+    b"$100=250.000 (x, step/mm)\r\nok\r\n",
 }
 DOOR = {
     b"?": b"<Door:1|MPos:0.000,0.000,0.000|FS:0,0|Pn:D>\r\n",
@@ -324,7 +325,7 @@ GRBLHAL = {
     b"$I": b"[VER:1.1f.20231210:]\r\n[OPT:VNMSL,100,1024,3,0]\r\nok\r\n",
     b"$G": b"[GC:G0 G54 G17 G21 G90 G94]\r\nok\r\n",
     b"$#": b"ok\r\n",
-    b"$$": b"$1=255\r\n$20=1\r\n$21=1\r\n$22=7\r\n$23=0\r\n$27=1.000\r\n"
+    b"$$": b"$1=255\r\n$13=0\r\n$20=1\r\n$21=1\r\n$22=7\r\n$23=0\r\n$27=1.000\r\n"
     b"$100=250.000\r\n$110=500.000\r\n$120=10.000\r\n$130=180.000\r\nok\r\n",
 }
 
@@ -364,7 +365,15 @@ FLUIDNC = {
     b"$#": b"ok\r\n",
     b"$$": b"$20=1\r\n$21=1\r\n$22=1\r\n$23=1\r\n$100=250.000\r\n$110=600.000\r\n"
     b"$120=50.000\r\n$130=180.000\r\nok\r\n",
+    b"$13": b"$13=0\r\nok\r\n",  # a command there, in no list of settings
 }
+
+
+def test_inches_that_are_in_no_list_are_asked_for():
+    clock, board = SteppedClock(), OldBoard({**FLUIDNC, b"$13": b"$13=1\r\nok\r\n"})
+    stage = GrblStage(_config(port=register_board("inches", board, clock)), clock)
+    with pytest.raises(StageError, match=r"\$13 \(report in inches\) is 1"):
+        stage.connect()
 
 
 @pytest.mark.parametrize(

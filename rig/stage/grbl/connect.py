@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -71,13 +72,7 @@ def connect_board(
     _refuse_open_door(session)
     restarts = session.restarts
     details = _ask_details(session)
-    settings = {
-        line.name: line.value
-        for line in session.command("$$", timeout_s=3.0 * config.answer_timeout_s)
-        if isinstance(line, Setting)
-    }
-    if not settings:
-        raise StageError("the board answers, but reports no settings to $$")
+    settings = _ask_settings(session, config)
     report = session.ask_place(config.answer_timeout_s)
     if session.restarts != restarts:
         raise StageError("the board restarts again and again; look at its power supply")
@@ -156,6 +151,17 @@ def _reset(session: GrblSession, config: StageConfig) -> None:
             "nobody answers as GRBL does: look at the cable, the power, the port and "
             f"stage.baud (now {config.baud})"
         )
+
+
+def _ask_settings(session: GrblSession, config: StageConfig) -> dict[str, str]:
+    """Return ``$$``, and ``$13``, which FluidNC keeps as a command of its own."""
+    lines = session.command("$$", timeout_s=3.0 * config.answer_timeout_s)
+    if not any(isinstance(line, Setting) for line in lines):
+        raise StageError("the board answers, but reports no settings to $$")
+    if not any(isinstance(line, Setting) and line.name == "13" for line in lines):
+        with contextlib.suppress(CommandRefusedError):  # it reports in mm alone
+            lines += session.command("$13")
+    return {line.name: line.value for line in lines if isinstance(line, Setting)}
 
 
 def _ask_details(session: GrblSession) -> tuple[str, ...]:
