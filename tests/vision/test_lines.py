@@ -8,10 +8,11 @@ import pytest
 
 from magbend.vision import as_photo
 from magbend.vision.find.binarise import binarise
-from magbend.vision.find.choose import Sought, search_rod
+from magbend.vision.find.choose import likely_rods
 from magbend.vision.find.ground import ground_distance
 from magbend.vision.find.lines import without_lines
 from magbend.vision.find.rod import find_candidates
+from magbend.vision.find.sought import Sought
 
 MAT, PALE, WHITE = (0.08, 0.25, 0.09), (0.45, 0.6, 0.45), (0.7, 0.7, 0.7)
 SKY, DARK = (0.6, 0.45, 0.25), (0.03, 0.05, 0.04)
@@ -47,7 +48,7 @@ def mat(*, rod, line, lines_px=3, pitch_px=33, clamp=WHITE):
 )
 def test_a_rod_is_found_on_a_cutting_mat(rod, line, wide, pitch):
     photo, axis = mat(rod=rod, line=line, lines_px=wide, pitch_px=pitch)
-    found, _ = search_rod(photo, Sought())
+    found = next(likely_rods(photo, Sought()))
     aside = [np.hypot(*(axis - point).T).min() for point in found.points_px]
     assert max(aside) < 6.0
     assert found.length_px == pytest.approx(380.0, rel=0.08)

@@ -15,23 +15,21 @@ from ..camera.calibration import Calibration
 from ..camera.find_tag import TaggedClamp, tagged_clamp
 from ..camera.oriented import oriented
 from ..curve.curve import Curve
-from ..curve.robust import median
 from ..edge.state import LostError
 from ..find.candidate import Candidate
-from ..find.choose import find_rod, search_rod
+from ..find.choose import find_rod, likely_rods, seen_best
 from ..find.coloured import shows_another
-from ..find.ground import LUMINANCE, View
+from ..find.ground import View
 from ..find.shadeless import in_its_colour, in_lightness
+from ..find.sought import Sought
 from ..find.track import Start, start_curve
 from ..measurement import Measurement, Pose, failure
 from ..picture.photo import Photo
 from .bare import flattened
+from .believed import apart_from_colour, better, doubted, is_sure
 from .crossing import crossings
 from .quality import (
     AROUND,
-    OTHER_COLOUR,
-    OTHER_ROD,
-    TIP_GOES_ON,
     doubts,
     doubts_around,
     is_as_before,
@@ -53,12 +51,11 @@ BROKEN = (
 """What numerics raise on pictures that hold no rod after all."""
 
 
-PALE = 0.3
-"""Light of a rod, over the paper's, above which it may be a shade, or a face of
-something: all levels and colours are then looked at."""
-
 BOTH = 1.25
 """Width over that of a rod alone, above which it is of rod and shade once more."""
+
+ASIDE = 1.8
+"""How much wider a rod may be than what stood out of it, as on its shaded side only."""
 
 SMOOTH = 0.12
 """Blur for a rough rod, in widths: its two edges do not feel each other yet."""
@@ -75,6 +72,24 @@ of the start, below which edges were lost, with how well that is known, px."""
 AS_COLOURED, ELSEWHERE = 0.1, 0.5
 """How far a side may be from where a rod's colour has it, in widths: so little that it
 is no shade's, and so much that it is no side of that rod."""
+
+
+class _TooWideError(LostError):
+    """What was measured is wider than its rod: with its shade, or that has a streak.
+
+    Parameters
+    ----------
+    found : Measurement
+        What was measured.
+    """
+
+    def __init__(self, found: Measurement) -> None:
+        super().__init__(
+            "edges_lost",
+            "the rod cannot be told from the deep shade beside it: light it from more "
+            "sides",
+        )
+        self.found = found
 
 
 def extract(photo: Photo, calibration: Calibration | None, **known: Any) -> Measurement:
@@ -131,21 +146,58 @@ def _measure(photo: Photo, setting: Setting) -> Measurement:
     try:
         rod, view = find_rod(photo, sought)
         quick = _measured(photo, setting, rod, view)
-        if _is_sure(quick, rod, view) and not shows_another(photo, rod):
+        if is_sure(quick, rod, view) and not shows_another(photo, rod):
             return quick
     except LostError as lost:
         doubt = lost
     except BROKEN:
         pass
     try:
-        whole = _measured(photo, setting, *search_rod(photo, sought))
+        whole = _searched(photo, setting, sought)
     except (LostError, *BROKEN) as lost:
         if quick is not None:
-            return _doubted(quick)
+            return doubted(quick)
         if isinstance(lost, LostError) and lost.seen_px:
             raise
         raise _empty(photo) or doubt from None
-    return whole if quick is None else _better(quick, whole)
+    return whole if quick is None else better(quick, whole)
+
+
+def _searched(photo: Photo, setting: Setting, sought: Sought) -> Measurement:
+    """Measure the likeliest of what all levels show that can be measured.
+
+    Raises
+    ------
+    LostError
+        Of the first thing that is like a rod.
+    """
+    first = LostError("no_rod", "nothing in the picture is long and thin like a rod")
+    try:
+        for rod in likely_rods(photo, sought):
+            try:
+                return _seen(photo, setting, *seen_best(photo, sought, rod))
+            except LostError as lost:
+                lost.seen_px = (rod.points_px,)
+                first = first if first.seen_px else lost
+    except LostError as several:
+        first = first if first.seen_px else several
+    raise first
+
+
+def _seen(photo: Photo, setting: Setting, rod: Candidate, view: View) -> Measurement:
+    """Measure a rod, with its edges farther aside if there are none nearer."""
+    try:
+        return measure_candidate(photo, setting, rod, view)
+    except LostError as lost:
+        if isinstance(lost, _TooWideError):
+            return doubted(lost.found)
+        if lost.flag != "edges_lost":
+            raise
+        wide = replace(rod, width_px=ASIDE * rod.width_px)
+        try:
+            return doubted(measure_candidate(photo, setting, wide, view))
+        except LostError:
+            raise lost from None
 
 
 def _measured(
@@ -156,43 +208,6 @@ def _measured(
         return measure_candidate(photo, setting, rod, view)
     except LostError as lost:
         raise LostError(lost.flag, lost.reason, [rod.points_px]) from None
-
-
-def _is_sure(quick: Measurement, rod: Candidate, view: View) -> bool:
-    """Whether one level of lightness may have shown the whole rod, and no shade.
-
-    What was measured by a colour of its own all along is none.
-    """
-    doubts = {TIP_GOES_ON, OTHER_COLOUR, "clamp_at_border"} & set(quick.flags)
-    coloured = quick.mix not in (None, LUMINANCE, view.mix)
-    return not doubts and (coloured or rod.ratio < PALE)
-
-
-def _doubted(quick: Measurement) -> Measurement:
-    """Return what one level shows and all levels together do not."""
-    if {TIP_GOES_ON, "clamp_at_border", OTHER_ROD, OTHER_COLOUR} & set(quick.flags):
-        return quick
-    return replace(quick, flags=(*quick.flags, OTHER_ROD))
-
-
-def _better(quick: Measurement, whole: Measurement) -> Measurement:
-    """Return the one of two measurements that is longer, or held by a clamp."""
-    if "clamp_at_border" in quick.flags:
-        held = not {"clamp_at_border", "no_clamp", "rough_edges"} & set(whole.flags)
-        return whole if held else quick
-    return (
-        quick if _same(quick, whole) and quick.length_px >= whole.length_px else whole
-    )
-
-
-def _same(one: Measurement, other: Measurement) -> bool:
-    """Whether two measurements are of one rod: the middle of one lies on the other."""
-    middle = len(one.points["x_px"]) // 2
-    away = np.hypot(
-        other.points["x_px"] - one.points["x_px"][middle],
-        other.points["y_px"] - one.points["y_px"][middle],
-    )
-    return bool(away.min() < max(one.width_px, other.width_px))
 
 
 def measure_candidate(
@@ -208,7 +223,7 @@ def measure_candidate(
     strip = along_candidate(view, candidate)
     far, parted = _far(strip), is_parted(strip)
     rod, seen = candidate, view
-    if far is None:  # no shade is hard otherwise
+    if far is None and not view.in_parts:  # no shade is hard otherwise
         rod, seen = in_its_colour(photo, candidate, view)
     if seen.plain and (parted or far is not None):
         # A streak may have left but a rim: its picture is needed farther from that.
@@ -234,29 +249,12 @@ def measure_candidate(
         if found is None:
             raise
         return found
-    apart = AS_COLOURED if seen.plain else _apart(plain, rod)
+    apart = AS_COLOURED if seen.plain else apart_from_colour(plain, rod)
     if found is not None and ("rough_edges" in plain.flags or apart > ELSEWHERE):
         return found
     if lost is not None and apart > ELSEWHERE:
         raise lost
-    return plain if apart < AS_COLOURED else _doubted(plain)
-
-
-def _apart(plain: Measurement, rod: Candidate) -> float:
-    """Return how far a side is from where the colour of a rod has it, in its widths.
-
-    Colour tells sides less well, but knows no shade.
-    """
-    points, n = plain.points, len(rod.points_px)
-    axis = np.column_stack([points["x_px"], points["y_px"]])
-    right = np.column_stack([points["right_x_px"], points["right_y_px"]])
-    inner = rod.points_px[n // 8 : n - n // 8]
-    nearest = np.hypot(*(inner[:, None] - axis).T).argmin(axis=0)
-    across = (right - axis)[nearest]
-    across /= np.hypot(*across.T)[:, None]
-    aside = median(np.sum((inner - axis[nearest]) * across, axis=1))
-    wider = 0.5 * (plain.width_px - rod.width_px)
-    return (abs(aside) + abs(wider)) / rod.width_px
+    return plain if apart < AS_COLOURED else doubted(plain)
 
 
 def _measured_in(
@@ -293,12 +291,8 @@ def _measured_in(
         smooth = _start(grey, candidate, sign, blur)
         start = replace(smooth, rough=True, width=start.width)
     result = finish(photo, replace(view, grey=grey), start, candidate, setting)
-    if alone is not None and result.width_px > BOTH * alone.width_px:
-        raise LostError(
-            "edges_lost",
-            "the rod cannot be told from the deep shade beside it: light it from more "
-            "sides",
-        )
+    if alone is not None and result.width_px > BOTH * alone.width_px + ROUGHLY:
+        raise _TooWideError(result)
     return result
 
 

@@ -14,7 +14,7 @@ from ...core.specimen import Specimen
 from ..camera.calibration import Calibration
 from ..camera.projection import LocalView, local_view
 from ..curve.curve import Curve
-from ..find.choose import Clamp, Sought
+from ..find.sought import Clamp, Sought
 from ..picture.photo import Photo
 
 Array = NDArray[np.float64]

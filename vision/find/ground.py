@@ -42,6 +42,9 @@ rod blurs into the paper."""
 _BETTER = 1.5
 """So much more must a mix of colours tell rod from paper than lightness does."""
 
+STANDS_OUT = 0.65
+"""How much darker than the paper a rod is in a mix of colours."""
+
 _ROOM = 11.0
 """How far about a rod its picture is looked at later, in widths."""
 
@@ -58,11 +61,15 @@ class View:
         -1 where the rod is lighter than the paper.
     mix : tuple of float or None
         Weights of blue, green and red; None is the photograph's own grey.
+    in_parts : bool
+        Whether its rod has two colours, each seen in a mix of its own: `mix` is that at
+        the root.
     """
 
     grey: Image
     sign: float
     mix: tuple[float, float, float] | None = None
+    in_parts: bool = False
 
     @property
     def plain(self) -> bool:
@@ -113,7 +120,7 @@ def best_view(photo: Photo, points_px: Array, width_px: float) -> View:
     width_px : float
         Its width.
     """
-    rod, left, right = _beside(points_px, width_px, photo.grey.shape)
+    rod, left, right = beside(points_px, width_px, photo.grey.shape)
     grey = _sampled(photo.grey, rod)
     paper = 0.5 * (_sampled(photo.grey, left) + _sampled(photo.grey, right))
     own = View(grey=photo.grey, sign=1.0 if median(paper - grey) > 0.0 else -1.0)
@@ -128,7 +135,7 @@ def best_view(photo: Photo, points_px: Array, width_px: float) -> View:
     best = int(np.argmax(contrast))
     if contrast[best] < _BETTER * quantile(own.sign * (paper - grey), 0.1):
         return own
-    mix = 0.65 * mixes[best] / max(median(step @ mixes[best]), 1e-6)
+    mix = STANDS_OUT * mixes[best] / max(median(step @ mixes[best]), 1e-6)
     sign = -1.0 if np.all(mix <= 0.0) else 1.0
     b, g, r = (float(part) for part in sign * mix)
     return mixed(photo, (b, g, r), sign, about(points_px, width_px))
@@ -157,7 +164,7 @@ def mixed(
     near : ndarray, shape (n, 2), optional
         Places (x, y) about which the picture is wanted; elsewhere it is bare paper.
     """
-    box = (slice(None), slice(None)) if near is None else _box(near)
+    box = (slice(None), slice(None)) if near is None else box_about(near)
     colour = None if mix is None else photo.colour(box)
     if colour is None:
         return View(grey=photo.grey, sign=sign)
@@ -170,7 +177,7 @@ def mixed(
     return View(grey=grey, sign=sign, mix=mix)
 
 
-def _box(points: Array) -> tuple[slice, slice]:
+def box_about(points: Array) -> tuple[slice, slice]:
     """Return the rows and columns that hold places."""
     (left, top), (right, bottom) = (
         np.maximum(ends(points, axis=0), 0.0).astype(int) for ends in (np.min, np.max)
@@ -208,7 +215,7 @@ def _paper_light(work: Image) -> Image:
     return np.asarray(np.maximum(fitted, np.float32(0.2 * middle)))
 
 
-def _beside(
+def beside(
     points: Array, width: float, shape: tuple[int, ...]
 ) -> tuple[Array, Array, Array]:
     """Return points in a rod, and as many on the paper at its left and right."""

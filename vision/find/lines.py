@@ -28,6 +28,10 @@ _SEEN, _TILES = 0.07, 8
 _FULL, _EVERYWHERE = 0.03, 0.5
 """Part of a tile that lines cover; and share of the tiles that have some."""
 
+_DARKEST, _MORE = 0.9, 0.03
+"""Part of the lines that is not farther from the paper than they are said to be; and
+how much farther something else is."""
+
 _LEFT = 0.12
 """Part of the lines that a disc may leave: then a larger one is needed."""
 
@@ -49,6 +53,22 @@ def without_lines(binary: Binary) -> Binary | None:
         if float(np.median(_covered(coarse, disc))) > (1.0 - _LEFT) * most:
             break
     return replace(binary, ratio=_closed(binary.ratio, disc + 2))
+
+
+def beyond_lines(binary: Binary, unlined: Binary) -> Binary:
+    """Return the picture with what is farther from the ground than its lines alone.
+
+    A rod as thin as they are is left.
+
+    Parameters
+    ----------
+    binary, unlined : Binary
+        The picture, and the same without its lines.
+    """
+    taken = (unlined.ratio - binary.ratio)[::2, ::2]
+    lines = np.quantile(taken[taken > _SEEN], _DARKEST) + _MORE
+    alone = np.where(binary.ratio > 1.0 - lines, np.float32(1.0), binary.ratio)
+    return replace(binary, ratio=np.asarray(alone, np.float32))
 
 
 def _closed(ratio: NDArray[Any], disc: int) -> NDArray[Any]:

@@ -209,7 +209,7 @@ def _coloured_band(photo: Photo, rod: Candidate) -> _Band | None:
     """Return what has a colour of its own along a candidate; None if nothing has."""
     if photo.colour_at(rod.points_px[:1]) is None:
         return None
-    points, normals, across = _lanes(rod)
+    points, normals, across = lanes_beside(rod)
     spots = points[:, None] + across[:, None] * normals[:, None]
     glance = np.asarray(photo.colour_at(spots[::_FEW, ::2]))
     paper = np.quantile(glance, _PAPER, axis=(0, 1)).astype(float)
@@ -218,7 +218,7 @@ def _coloured_band(photo: Photo, rod: Candidate) -> _Band | None:
     light = np.asarray(photo.colour_at(spots))
     share = light / paper
     tint = _tinted(share)
-    sides = _nearest_band(tint > 0.5, across)
+    sides = nearest_band(tint > 0.5, across)
     seen = np.flatnonzero(np.isfinite(sides[:, 0]))
     if len(seen) < _ALL_ALONG * len(points):
         return None
@@ -230,7 +230,7 @@ def _coloured_band(photo: Photo, rod: Candidate) -> _Band | None:
     )  # fmt: skip
 
 
-def _lanes(rod: Candidate) -> tuple[Array, Array, Array]:
+def lanes_beside(rod: Candidate) -> tuple[Array, Array, Array]:
     """Return points along a rod, their normals, and offsets of lanes beside it."""
     _, points, theta = resample(rod.points_px, 0.6 * rod.width_px)
     every = max(1, len(points) // _STATIONS)
@@ -240,7 +240,7 @@ def _lanes(rod: Candidate) -> tuple[Array, Array, Array]:
     return points[::every], normals[::every], np.concatenate([-side[::-1], [0.0], side])
 
 
-def _nearest_band(on: Mask, across: Array) -> Array:
+def nearest_band(on: Mask, across: Array) -> Array:
     """Return where what is on, next to the axis, begins and ends; (n, 2), or NaN."""
     lane = np.arange(len(across))
     nearest = np.argmin(np.where(on, np.abs(across), np.inf), axis=1)[:, None]

@@ -1,0 +1,71 @@
+"""Which of two measurements of one photograph is believed, and how much."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..curve.robust import median
+from ..find.candidate import Candidate
+from ..find.ground import LUMINANCE, View
+from ..measurement import Measurement
+from .quality import OTHER_COLOUR, OTHER_ROD, TIP_GOES_ON
+
+PALE = 0.3
+"""Light of a rod, over the paper's, above which it may be a shade, or a face of
+something: all levels and colours are then looked at."""
+
+
+def is_sure(quick: Measurement, rod: Candidate, view: View) -> bool:
+    """Whether one level of lightness may have shown the whole rod, and no shade.
+
+    What was measured by a colour of its own all along is none.
+    """
+    doubts = {TIP_GOES_ON, OTHER_COLOUR, "clamp_at_border"} & set(quick.flags)
+    coloured = quick.mix not in (None, LUMINANCE, view.mix)
+    return not doubts and (coloured or rod.ratio < PALE)
+
+
+def doubted(quick: Measurement) -> Measurement:
+    """Return what one level shows and all levels together do not."""
+    if {TIP_GOES_ON, "clamp_at_border", OTHER_ROD, OTHER_COLOUR} & set(quick.flags):
+        return quick
+    return replace(quick, flags=(*quick.flags, OTHER_ROD))
+
+
+def better(quick: Measurement, whole: Measurement) -> Measurement:
+    """Return the one of two measurements that is longer, or held by a clamp."""
+    if "clamp_at_border" in quick.flags:
+        held = not {"clamp_at_border", "no_clamp", "rough_edges"} & set(whole.flags)
+        return whole if held else quick
+    return (
+        quick if _same(quick, whole) and quick.length_px >= whole.length_px else whole
+    )
+
+
+def _same(one: Measurement, other: Measurement) -> bool:
+    """Whether two measurements are of one rod: the middle of one lies on the other."""
+    middle = len(one.points["x_px"]) // 2
+    away = np.hypot(
+        other.points["x_px"] - one.points["x_px"][middle],
+        other.points["y_px"] - one.points["y_px"][middle],
+    )
+    return bool(away.min() < max(one.width_px, other.width_px))
+
+
+def apart_from_colour(plain: Measurement, rod: Candidate) -> float:
+    """Return how far a side is from where the colour of a rod has it, in its widths.
+
+    Colour tells sides less well, but knows no shade.
+    """
+    points, n = plain.points, len(rod.points_px)
+    axis = np.column_stack([points["x_px"], points["y_px"]])
+    right = np.column_stack([points["right_x_px"], points["right_y_px"]])
+    inner = rod.points_px[n // 8 : n - n // 8]
+    nearest = np.hypot(*(inner[:, None] - axis).T).argmin(axis=0)
+    across = (right - axis)[nearest]
+    across /= np.hypot(*across.T)[:, None]
+    aside = median(np.sum((inner - axis[nearest]) * across, axis=1))
+    wider = 0.5 * (plain.width_px - rod.width_px)
+    return (abs(aside) + abs(wider)) / rod.width_px
