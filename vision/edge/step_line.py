@@ -229,7 +229,7 @@ def _solve(
         total[:, :3] += scale * rise[g] * equations[g, :3, :3]
         total[:, 3] += scale * equations[g, :3, 3]
         left += weight[g] * equations[g, 3, 3]
-    if not np.linalg.det(total[:, :3]) > 0.0:
+    if not (np.isfinite(np.sum(total)) and np.linalg.det(total[:, :3]) > 0.0):
         return False
     step[:] = np.linalg.solve(total[:, :3].copy(), total[:, 3].copy())
     left -= float(np.sum(step * total[:, 3]))

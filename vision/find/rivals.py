@@ -25,8 +25,8 @@ _AS_LONG = 0.6
 """Length over the rod's from which another thing cannot be told from it; a shorter one
 is a doubt."""
 
-_STROKE = 0.4
-"""Length over another's below which a thing is no rod beside that."""
+_STROKE, _THINNER = 0.4, 0.5
+"""Length and width over another's below which a thing is no rod beside that."""
 
 _SHADE, _BESIDE = 0.65, 8.0
 """Contrast of a shade over that of its rod, at most; and how far it may lie from the
@@ -42,6 +42,9 @@ _RIM_PX = 5.0
 _PALER = 0.25
 """How much lighter than the rod, of the paper's light, a thing is that is no rod."""
 
+
+_PATTERN = 3
+"""Things as likely as the rod that are a pattern, whether their ends are free or not."""
 
 _SHOWN = 6
 """Things that are drawn on the overlay of a refusal."""
@@ -87,23 +90,24 @@ def standing_out(things: list[Thing], sought: Sought) -> Candidate:
         other.best
         for other in rivals
         if not other.is_shade
-        and bound(other.best) <= bound(rod)
         and other.best.length_px > _AS_LONG * rod.length_px
         and not sought.tells(rod, other.best, _HINTED)
     ]
-    if as_likely:
+    tips = [other for other in as_likely if bound(other) <= bound(rod)]
+    if tips or len(as_likely) >= _PATTERN:
         raise too_many([rod, *as_likely], sought)
     return rod
 
 
 def _outdoes(thing: Thing, first: Thing) -> bool:
-    """Whether beside a thing another, about as clear and held as well, is a stroke."""
+    """Whether beside a thing another, as clear and held as well, is but a stroke."""
     one, two = first.best, thing.best
     return (
         thing.worth > _AS_CLEAR * first.worth
         and two.root == one.root
         and two.contacts == one.contacts
         and one.length_px < _STROKE * two.length_px
+        and one.width_px < _THINNER * two.width_px
     )
 
 
@@ -177,7 +181,7 @@ def _rivals(first: Thing, other: Thing) -> bool:
     return (
         not two.lies_on(one)
         and not are_halves(one, two)
-        and 0.5 < two.width_px / one.width_px < 2.0
+        and _THINNER < two.width_px / one.width_px < 1.0 / _THINNER
         and two.length_px > _STROKE * one.length_px
         and (one.root != "clamp" or two.root == "clamp")
         and len(other.seen) > _AS_CLEAR * len(first.seen)
@@ -191,7 +195,7 @@ def alike(first: Candidate, rods: list[Candidate]) -> list[Candidate]:
         other
         for other in rods
         if other is not first
-        and 0.5 < other.width_px / first.width_px < 2.0
+        and _THINNER < other.width_px / first.width_px < 1.0 / _THINNER
         and other.length_px > _STROKE * first.length_px
         and other.ratio < first.ratio + _PALER
         and (first.root != "clamp" or other.root == "clamp")
