@@ -10,7 +10,7 @@ from magbend.vision import as_photo
 from magbend.vision.find.binarise import binarise
 from magbend.vision.find.choose import likely_rods
 from magbend.vision.find.ground import ground_distance
-from magbend.vision.find.lines import without_lines
+from magbend.vision.find.lines import beyond_lines, without_lines
 from magbend.vision.find.rod import find_candidates
 from magbend.vision.find.sought import Sought
 
@@ -18,8 +18,8 @@ MAT, PALE, WHITE = (0.08, 0.25, 0.09), (0.45, 0.6, 0.45), (0.7, 0.7, 0.7)
 SKY, DARK = (0.6, 0.45, 0.25), (0.03, 0.05, 0.04)
 
 
-def mat(*, rod, line, lines_px=3, pitch_px=33, clamp=WHITE):
-    """Return a mat with squares, turned by 12 degrees, and a bent rod of 22 px."""
+def mat(*, rod, line, lines_px=3, pitch_px=33, clamp=WHITE, rod_px=22):
+    """Return a mat with squares, turned by 12 degrees, and a bent rod."""
     light = np.empty((500, 800, 3), np.float32)
     light[:] = MAT
     turn = np.radians(12.0)
@@ -34,7 +34,7 @@ def mat(*, rod, line, lines_px=3, pitch_px=33, clamp=WHITE):
     steps = 1.9 * np.column_stack([np.cos(theta), np.sin(theta)])
     axis = np.array([200.0, 130.0]) + np.cumsum(steps, axis=0)
     fixed = np.rint(16.0 * axis).astype(np.int32).reshape(-1, 1, 2)
-    cv2.polylines(light, [fixed], False, rod, 22, cv2.LINE_AA, 4)
+    cv2.polylines(light, [fixed], False, rod, rod_px, cv2.LINE_AA, 4)
     cv2.rectangle(light, (80, 50), (200, 210), clamp, -1)
     light = cv2.GaussianBlur(light, (0, 0), 0.9)
     light += np.random.default_rng(4).normal(0.0, 0.004, light.shape)
@@ -77,3 +77,14 @@ def test_squared_paper_is_no_rod_nor_is_it_followed_from_mesh_to_mesh():
     binary = binarise(photo.grey, invert=False)
     assert cv2.connectedComponents(1 - binary.mask)[0] > 200
     assert find_candidates(binary) == []
+
+
+def test_a_rod_as_thin_as_the_lines_is_left_by_what_it_stands_out_more():
+    photo, axis = mat(rod=WHITE, line=(0.13, 0.3, 0.14), lines_px=4, rod_px=5)
+    before = ground_distance(photo)
+    x, y = np.rint(axis[20:-20]).astype(int).T
+    unlined = without_lines(before)
+    assert np.median(unlined.ratio[y, x]) > 0.9
+    after = beyond_lines(before, unlined)
+    assert np.array_equal(after.ratio[y, x], before.ratio[y, x])
+    assert (after.ratio > 0.99).mean() > 0.9 > (before.ratio > 0.93).mean()

@@ -16,7 +16,11 @@ from magbend.vision import (
     measure,
     specimen_to_px,
 )
+from magbend.vision.edge.state import LostError
 from magbend.vision.find.candidate import Candidate
+from magbend.vision.find.choose import LEAST_LENGTH
+from magbend.vision.find.rivals import standing_out
+from magbend.vision.find.sought import Sought
 from magbend.vision.find.things import Thing, without_strokes
 from magbend.vision.synthetic import (
     BLACK,
@@ -142,6 +146,16 @@ def test_a_cable_through_the_picture_is_no_rod():
     )
     assert found.ok, found.reason
     assert off(found) < 0.05
+
+
+def test_a_short_rod_is_found_where_a_cable_leads_through_the_picture():
+    """It is 7 % of the picture's diagonal, and 10 widths."""
+    short = curve("graded", angle_deg=20.0, length_mm=7.0)
+    cable = Mark(outline_mm=bar(-30.0, 11.5, 60.0, 1.0), colour=(0.05,) * 3)
+    found = measured(replace(PLAIN, centreline=short, side_mm=0.7, marks=(cable,)))
+    assert found.ok, found.reason
+    assert found.length_px < LEAST_LENGTH * np.hypot(*CAMERA.image_size_px)
+    assert off(found, short) < 0.05
 
 
 def test_a_specimen_tells_its_rod_from_another_in_a_clamp():
@@ -275,3 +289,31 @@ def test_strokes_of_a_ruler_are_no_rods():
     # Rods side by side, of which none is longer, stay rivals.
     assert without_strokes(strokes) == strokes
     assert len(without_strokes([*strokes[:2], rod])) == 3
+
+
+def held(item, *, levels, contacts=1, **known):
+    """Return a thing in a clamp, as so many levels show it."""
+    seen = replace(item.best, root="clamp", contacts=contacts, **known)
+    return Thing([seen] * levels)
+
+
+def test_a_cable_that_is_held_at_both_ends_is_no_rival():
+    """A rod has a tip; two that have one are refused."""
+    rod = held(thing((50.0, 400.0), (420.0, 400.0), 18.0, bend=-90.0), levels=6)
+    beside = thing((60.0, 90.0), (500.0, 100.0), 22.0)
+    found = standing_out([rod, held(beside, levels=9, contacts=2)], Sought())
+    assert found.points_px is rod.best.points_px
+    assert found.rivalled
+    with pytest.raises(LostError, match="two things"):
+        standing_out([rod, held(beside, levels=6)], Sought())
+
+
+def test_a_line_that_is_shorter_and_thinner_is_no_rod_beside_another():
+    rod = held(thing((50.0, 400.0), (420.0, 400.0), 26.0, bend=-90.0), levels=3)
+    lines = [
+        held(thing((x, 90.0), (x + 90.0, 40.0 + 0.2 * x), 4.0), levels=3)
+        for x in (30.0, 200.0, 420.0)
+    ]
+    found = standing_out([*lines, rod], Sought())
+    assert found.points_px is rod.best.points_px
+    assert found.rivalled

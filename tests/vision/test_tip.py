@@ -11,7 +11,7 @@ from scipy.special import erf, ndtr
 from magbend.vision import Pose, as_photo, extract
 from magbend.vision.edge.clamp import ClampLines, between
 from magbend.vision.edge.crossings import EndFace, crossings_of, line_through
-from magbend.vision.edge.step_line import fit_step
+from magbend.vision.edge.step_line import _solve, fit_step
 from magbend.vision.edge.tip import _rough_end
 from magbend.vision.synthetic import (
     Block,
@@ -164,3 +164,11 @@ def test_a_paler_tail_is_no_shade_but_a_level_step_is():
     assert place(tail) == pytest.approx(-2.0, abs=0.6)
     step = 0.28 * ndtr(s + 8.0) + 0.72 * ndtr(s - 6.0)
     assert place(step) == pytest.approx(-8.0, abs=0.6)
+
+
+def test_a_step_of_which_nothing_is_known_is_none():
+    """A lane that a levelled profile tells beyond all bounds stopped the frame."""
+    endless = np.full((1, 4, 4), np.inf)
+    step = np.zeros(3)
+    assert not _solve(endless, np.ones(1), np.ones(1), BLUR, (BLUR, 1.0), step)
+    assert not step.any()

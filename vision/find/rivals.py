@@ -44,7 +44,7 @@ _PALER = 0.25
 
 
 _PATTERN = 3
-"""Things as likely as the rod that are a pattern, whether their ends are free or not."""
+"""Things as likely as the rod that are a pattern, be their ends free or not."""
 
 _SHOWN = 6
 """Things that are drawn on the overlay of a refusal."""
