@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from magbend.vision import Pose, as_photo, extract
+from magbend.vision.edge.clamp import ClampLines
+from magbend.vision.edge.crossings import EndFace
 from magbend.vision.extraction.clamp_fit import APART, joint
+from magbend.vision.extraction.root import root_place
+from magbend.vision.extraction.setting import Setting
 from magbend.vision.synthetic import (
     Block,
     Mark,
@@ -59,6 +65,21 @@ def test_what_disagrees_is_not_averaged_away(rod_sd, believed):
     )
     agreed = joint(0.05, rod_sd, 0.0, 0.0, turn_sd)[1]
     assert covariance[1, 1] > 1.5 * agreed[1, 1]
+
+
+def test_an_end_on_the_rod_that_no_front_checks_is_doubted_more():
+    end = EndFace(0.0, 0.03, 0.0, 0.05, 1.0, 0.3, 1.0)
+    ends = SimpleNamespace(rise_along=np.zeros(2), along=np.full(2, 20.0))
+
+    def place(front):
+        seen = SimpleNamespace(
+            clamp=ClampLines(face=end, front=front), blur=1.0, typical_width=20.0,
+            tip=SimpleNamespace(blur=1.0),
+        )  # fmt: skip
+        return root_place(seen, ends, Setting(), 0.5)
+
+    assert place(None).s == place(end).s == 0.0
+    assert place(None).sd > 2.0 * place(end).sd
 
 
 def photographed(shape, *, skew_deg=0.0):

@@ -23,14 +23,15 @@ from .setting import UNKNOWN_CLAMP_MM, Setting
 HIDDEN_MM = 0.05
 """What part of the root a clamp of unknown height may hide before that is named."""
 
-BORDER_PX, CARRIED, BETWEEN, SMEARED = 0.3, 0.004, 0.2, 1.3
+BORDER_PX, CARRIED, BETWEEN, SMEARED = 0.3, 0.002, 0.15, 1.3
 """Standard deviation of a place: px, of where a rod enters the picture; as shares of
 how far a line is carried to the height of the axis, of how far two lines are apart, and
 of what blurs a line more than the rod's sides and its tip: the front of a shade, seen
 as one line with the clamp's (errors of 0.6 to 2 times that on drawings)."""
 
-BROKEN_MM = 0.05
-"""Doubt of how high the top edge is that hides a root: edges of clamps are broken."""
+UNCHECKED = 2.5
+"""And over that of the rod's end on its own lanes where no front is seen beside it: the
+light on a rod changes near its end, alike on all of them."""
 
 ROUND, ROUND_CARRIED = 0.3, 0.7
 """How far the front of a chuck, a disc, bulges toward the tip where it is seen aslant,
@@ -96,7 +97,7 @@ def root_place(
         hidden = hidden_px(refined, setting, rise) / math.sqrt(3.0)
         place, line = _hidden_root(refined, ends, setting), front or face
         carried = 0.0 if line is None else place - line.s
-        sd = _sd(refined, line, share * carried, BROKEN_MM * rise, hidden)
+        sd = _sd(refined, line, share * carried, hidden)
         return RootPlace(s=place, sd=sd, hidden=hidden)
     if is_round and face is not None:
         # Its rim is at no height that is known; the rod's own lanes are.
@@ -125,9 +126,11 @@ def root_place(
 
 def _sd(refined: Refined, line: EndFace | None, *doubts: float) -> float:
     """Return the deviation of a place that a line tells, with other doubts, px."""
-    own = 0.0 if line is None else line.place_sd
-    smeared = 0.0 if line is None else SMEARED * smeared_px(refined, line.blur)
-    return math.hypot(own, smeared, *doubts)
+    if line is None:
+        return math.hypot(*doubts)
+    lone = refined.clamp is not None and refined.clamp.front is None
+    own = (UNCHECKED if lone else 1.0) * line.place_sd
+    return math.hypot(own, SMEARED * smeared_px(refined, line.blur), *doubts)
 
 
 def smeared_px(refined: Refined, blur: float) -> float:
