@@ -12,7 +12,9 @@ from ..link import Link
 from ..wire_log import WireLog
 from .config import AxisConfig, why_not_set
 
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+_NUMBER = re.compile(r"(?<![\w.+-])[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+"""A number that stands by itself: the 1 of ``CH1`` or ``OUT-1`` is a name's."""
+
 _ANSWER_S = 1.0
 _POLL_S = 0.1
 
@@ -101,13 +103,15 @@ class LineAxis:
         self._send(self._config.read_line)
         check()
         answer = self._link.read_line(_ANSWER_S)
-        number = _NUMBER.search(answer or "")
-        if number is None or not math.isfinite(float(number.group())):
+        if answer == self._config.read_line.strip():  # a device that echoes
+            answer = self._link.read_line(_ANSWER_S)
+        numbers = _NUMBER.findall(answer or "")
+        if len(numbers) != 1 or not math.isfinite(float(numbers[0])):
             raise RigError(
                 f"{self._config.name}: the answer to {self._config.read_line!r} must "
-                f"hold a number; instead received {answer!r}"
+                f"hold one number; instead received {answer!r}"
             )
-        return float(number.group())
+        return float(numbers[0])
 
     def _send(self, line: str) -> None:
         self._link.write((line + self._config.line_end).encode("latin-1"))

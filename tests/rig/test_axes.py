@@ -98,14 +98,16 @@ def test_what_has_no_limits_or_passes_them_is_refused(tmp_path, axis, scan, said
 class Supply:
     """A supply on a pseudo-terminal that takes ``CURR x`` and answers ``CURR?``."""
 
-    def __init__(self, *, sticks_at: float | None = None) -> None:
+    def __init__(
+        self, *, sticks_at: float | None = None, answer: str = "{:.4f} A"
+    ) -> None:
         import tty
 
         self.master, slave = os.openpty()
         tty.setraw(slave)
         self.port, self._slave = os.ttyname(slave), slave
         self.seen: list[str] = []
-        self._value, self._sticks_at = 0.0, sticks_at
+        self._value, self._sticks_at, self._answer = 0.0, sticks_at, answer
         threading.Thread(target=self._serve, daemon=True).start()
 
     def _serve(self) -> None:
@@ -119,7 +121,9 @@ class Supply:
                 line, _, buffer = buffer.partition(b"\n")
                 self.seen.append(line.decode())
                 if line == b"CURR?":
-                    os.write(self.master, f"{self._value:.4f} A\n".encode())
+                    os.write(
+                        self.master, f"{self._answer}\n".format(self._value).encode()
+                    )
                 elif line.startswith(b"CURR "):
                     asked = float(line[5:])
                     self._value = self._sticks_at if self._sticks_at else asked
@@ -141,6 +145,22 @@ def test_a_supply_is_set_and_read_back():
     axis.close()
     assert supply.seen == ["CURR 1.250", "CURR?"]
     json.dumps(axis.identity)
+
+
+@pytest.mark.parametrize("answer", ["CURR?\n{:.4f} A", "CH1 {:.4f}", "OUT-1={:.3e}A"])
+def test_a_number_in_an_echo_or_a_name_is_no_reading(answer):
+    # Stuck at 0 A, a supply must not seem to reach the 1 A of its channel's name.
+    axis = Supply(sticks_at=1e-9, answer=answer).axis()
+    with pytest.raises(RigError, match=r"instead it is 1e-09|instead it is 0 "):
+        axis.set(1.0)
+    axis.close()
+
+
+def test_an_answer_of_two_numbers_is_none():
+    axis = Supply(answer="{:.4f} A 12.0 V").axis()
+    with pytest.raises(RigError, match=r"must hold one number; .*12\.0 V"):
+        axis.set(1.0)
+    axis.close()
 
 
 def test_a_supply_that_does_not_get_there_is_no_step():
