@@ -32,6 +32,7 @@ _OPERATIONS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 TOTAL = "total_length_mm"
 """The sum of the sections' lengths: a column that no library holds."""
 
+_BEYOND_INT = 2**63  # Arrow's whole numbers end there
 NEAR = 1e-6
 """Within which computed numbers are equal."""
 
@@ -44,14 +45,8 @@ def parse_where(text: str, columns: Sequence[str]) -> Any:
     InputError
         If it is no condition, or names a column that the library does not have.
     """
-    try:
-        tree = ast.parse(text.strip(), mode="eval").body
-    except (SyntaxError, ValueError, RecursionError):
-        raise InputError(
-            f"--where must be a condition such as 'tip_y_mm > 4 and side_mm < 1'; "
-            f"instead received {text!r}"
-        ) from None
-    return _node(tree, columns, text)
+    must = "--where must be a condition such as 'tip_y_mm > 4 and side_mm < 1'"
+    return _node(_tree(text, must), columns, text)
 
 
 def parse_value(text: str, columns: Sequence[str]) -> Any:
@@ -62,14 +57,11 @@ def parse_value(text: str, columns: Sequence[str]) -> Any:
     InputError
         If it is none, or names a column that the library does not have.
     """
-    try:
-        tree = ast.parse(text.strip(), mode="eval").body
-    except (SyntaxError, ValueError, RecursionError):
-        raise InputError(
-            f"a key must be a column or a number computed from columns, such as "
-            f"E1_MPa/E3_MPa; instead received {text!r}"
-        ) from None
-    return _value(tree, columns, text)
+    must = (
+        "a key must be a column or a number computed from columns, such as "
+        "E1_MPa/E3_MPa"
+    )
+    return _value(_tree(text, must), columns, text)
 
 
 def parse_range(text: str, columns: Sequence[str]) -> Any:
@@ -121,6 +113,13 @@ def all_of(expressions: Iterable[Any]) -> Any:
     return joined
 
 
+def _tree(text: str, must: str) -> ast.expr:
+    try:
+        return ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, RecursionError):
+        raise InputError(f"{must}; instead received {text!r}") from None
+
+
 def _node(node: ast.expr, columns: Sequence[str], text: str) -> Any:
     if isinstance(node, ast.BoolOp):
         parts = [_node(value, columns, text) for value in node.values]
@@ -170,6 +169,13 @@ def _is_abs(node: ast.expr) -> TypeGuard[ast.Call]:
     return call and len(node.args) == 1 and not node.keywords  # type: ignore[attr-defined]
 
 
+def _is_constant(node: ast.expr) -> TypeGuard[ast.Constant]:
+    value = node.value if isinstance(node, ast.Constant) else None
+    if type(value) is int:
+        return abs(value) < _BEYOND_INT
+    return type(value) in (float, str)
+
+
 def _near(left: Any, right: Any, equal: bool) -> Any:
     import pyarrow.compute as pc
 
@@ -209,7 +215,7 @@ def _value(node: ast.expr, columns: Sequence[str], text: str) -> Any:
     if _is_abs(node):
         value = _value(node.args[0], columns, text)
         return abs(value) if _is_plain(value) else pc.abs(value)
-    if isinstance(node, ast.Constant) and type(node.value) in (int, float, str):
+    if _is_constant(node):
         return node.value
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, (ast.USub, ast.UAdd)):
         value = _value(node.operand, columns, text)

@@ -456,6 +456,7 @@ def test_the_nearest_shape_is_the_one_asked_for(library, table):
     [
         ({"where": "tip_ymm > 4"}, "did you mean 'tip_y_mm'"),
         ({"where": "__import__('os')"}, "cannot use"),
+        ({"where": f"tip_y_mm + 1{'0' * 400} > 1"}, "cannot use"),
         ({"where": "tip_y_mm >"}, "must be a condition"),
         ({"where": "1 < 2"}, "compares no column"),
         ({"where": "status > 4"}, "unlike things"),

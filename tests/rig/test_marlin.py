@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 import pytest
@@ -38,6 +39,7 @@ class MarlinBoard:
         self.homed = self.silent = self.short = self.old = False
         self.waits = self.place_in_ok = self.relative = False
         self.offset_mm = 0.0  # G92
+        self.motors_off_after_s = 120.0
         self.ok = "ok"
         self.seen: list[str] = []
         self.say("start\necho:Marlin 2.1.2.4", 0.5)
@@ -91,6 +93,8 @@ class MarlinBoard:
             self.relative = line == "G91"
         elif line.startswith(("M118", "M211")) or (line == "G21" and self.old):
             self.say(f'echo:Unknown command: "{line}"', now)
+        elif line.startswith("M84 S"):
+            self.motors_off_after_s = float(line[5:]) or math.inf
         elif line == "M400":
             now = max(now, self._free_s)
         elif line == "M410":
@@ -161,6 +165,17 @@ def test_coordinates_that_another_program_left_relative_are_absolute_again(tmp_p
     board.relative = True
     stage.move_to(50.0, feed_mm_min=600.0)
     assert board.x_mm == 50.0
+
+
+def test_the_motors_hold_the_stage_through_a_long_step(bench):
+    board, stage, _ = bench
+    stage.connect()
+    stage.home()
+    stage.goto_gap(100.0)
+    assert board.motors_off_after_s == math.inf
+    board.motors_off_after_s = 120.0  # it was restarted, and is homed again
+    stage.home()
+    assert board.motors_off_after_s == math.inf
 
 
 def test_nothing_moves_by_coordinates_that_are_offset(bench):

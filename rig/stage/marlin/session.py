@@ -134,16 +134,20 @@ class MarlinSession:
         self.planned_mm = read_planned(lines, axis)
         return self.place_mm
 
-    def make_absolute(self) -> None:
-        """Let coordinates be absolute and in mm, however an earlier program left them.
+    def make_ready(self) -> None:
+        """Let coordinates be absolute and in mm, and motors hold the stage at rest.
+
+        An earlier program, or a restart, may have left them otherwise: by default a
+        Marlin switches its motors off after two minutes, and keeps its count.
 
         Raises
         ------
         LineRefusedError
             If the board knows no absolute coordinates.
         """
-        with contextlib.suppress(LineRefusedError):  # a build that knows mm alone
-            self.command("G21")
+        for line in ("G21", "M84 S0"):
+            with contextlib.suppress(LineRefusedError):  # a build that knows no other
+                self.command(line)
         self.command("G90")
 
     def _exchange(

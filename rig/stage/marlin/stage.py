@@ -67,7 +67,7 @@ class MarlinStage(SerialStage[MarlinSession]):
         self._trust.lose()
         limit_s = self._config.home_timeout_s or _HOME_S
         with self._stand_if_interrupted(at_once=True):
-            session.make_absolute()
+            session.make_ready()
             lines = session.command(
                 f"G28 {self._config.axis}",
                 timeout_s=limit_s,
@@ -253,7 +253,7 @@ class MarlinStage(SerialStage[MarlinSession]):
     def _known_mm(self) -> float:
         """Return where the board stands, ready to be sent elsewhere by its count."""
         session = self._require_session()
-        session.make_absolute()
+        session.make_ready()
         here, planned = self._machine_mm(), session.planned_mm
         if here is None:
             raise PositionLostError("the stage does not report its position; home it")

@@ -129,7 +129,7 @@ class MarlinBoard(BoardLine):
             self._queue(line)
         elif code == "M410":
             self.mover.kill()
-        elif code not in ("M400", "G21", "G90"):
+        elif code not in ("M400", "G21", "G90", "M84"):
             self._say(f'echo:Unknown command: "{line}"')
         if code in ("M400", "G28") and self.mover.running:
             self._waits_since_s = self._told_s = self.now_s
