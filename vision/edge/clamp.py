@@ -31,6 +31,9 @@ _LANES = np.linspace(-0.5, 0.5, 9)
 _BESIDE = np.linspace(0.5, 2.0, 13)
 _FACE_SEEN, _FRONT_SEEN = 0.6, 3.0
 """Widths of the rod over which the two lines are seen."""
+_SHADED = 0.03
+"""Light times px by which shade and grain move a line seen over one width of a rod,
+alike on all its lanes: the likeliest on scenes of two kinds."""
 _CLAMP_SPAN = 3.0
 """So many blurs of the clamp are fitted: its foot and the corner over the rod are dark,
 and only what lies right beside the line makes the step."""
@@ -87,16 +90,20 @@ class ClampLines:
 
 
 def between(first: float, second: float, lines: ClampLines) -> float:
-    """Return a place between those that each of two lines tells.
-
-    What shade and grain do to a line goes with the inverse of its step's height, and is
-    alike on neighbouring lanes, whose scatter does not show it: the weight is the
-    square of that height, times how much of the line is seen.
-    """
-    face, front = lines.face, lines.front
-    a = 0.0 if face is None else _FACE_SEEN * face.rise**2
-    b = 0.0 if front is None else _FRONT_SEEN * front.rise**2
+    """Return the place by the least squares of those that each of two lines tells."""
+    a, b = _sureness(lines.face, _FACE_SEEN), _sureness(lines.front, _FRONT_SEEN)
     return (a * first + b * second) / (a + b) if a + b > 0.0 else 0.5 * (first + second)
+
+
+def _sureness(line: EndFace | None, seen: float) -> float:
+    """Return the inverse of the variance of a line that is seen over so many widths.
+
+    What shade and grain do alike to neighbouring lanes does not show in their scatter;
+    it goes with the inverse of the step's height.
+    """
+    if line is None or line.rise <= 0.0:
+        return 0.0
+    return 1.0 / (line.place_sd**2 + (_SHADED / line.rise) ** 2 / seen)
 
 
 def find_clamp(
