@@ -32,11 +32,21 @@ class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
             self._finalize_dynamic_globals()
             self._finalized = True
 
+    def _optimize_final_module(self) -> None:
+        """Inline what is small: the rest is optimised where it becomes machine code."""
+        manager, builder = self._codegen._module_pass_manager(
+            loop_vectorize=self._codegen._loopvect, slp_vectorize=False,
+            opt=self._codegen._opt_level, cost="cheap",
+        )  # fmt: skip
+        manager.run(self._final_module, builder)
+
     def emit(self) -> None:
         """Make machine code."""
         if self.is_emitted:
             return
         self.is_emitted = True
+        if not self._disable_inspection:
+            super()._optimize_final_module()
         module = self._final_module
         environments = [x.name for x in module.global_variables if not x.is_declaration]
         super()._finalize_final_module()
