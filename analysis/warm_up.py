@@ -31,7 +31,8 @@ def warm_up() -> None:
     """Compile everything that `magbend demo` calls, in two processes."""
     context = multiprocessing.get_context("spawn")
     with context.Pool(2) as pool:
-        for result in [pool.apply_async(job) for job in (_rod, _photograph, _solid)]:
+        jobs = (_photograph, _curve, _rod, _solid)
+        for result in [pool.apply_async(job) for job in jobs]:
             result.get()
 
 
@@ -49,6 +50,21 @@ def _solid() -> None:
     from .. import sim
 
     sim.solve(sim.gmc(2), sim.UniformField(flux_mT=50.0), model="solid")
+
+
+def _curve() -> None:
+    """Compile what fits a centreline: a photograph comes to it last."""
+    from ..vision.curve.fit import Smooth, solve
+    from ..vision.curve.joints import find_joints
+    from ..vision.curve.moment import weighed_fit
+    from ..vision.curve.problem import SHARED, pose
+
+    s = np.linspace(0.0, 200.0, 201)
+    points, theta, ones = np.column_stack((s, np.zeros_like(s))), 0.0 * s, np.ones(201)
+    problem = pose(s, points, ones, theta, spacing=10.0, joints=(100.0,))
+    solve(problem, Smooth())
+    weighed_fit(problem, (100.0,), 20.0)
+    find_joints(s, theta, theta, ones, width=10.0, shared=SHARED)
 
 
 def _photograph() -> None:

@@ -77,7 +77,7 @@ class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
         """Return what is kept in the cache."""
         if self.is_emitted:
             return super().serialize_using_object_code()  # type: ignore[no-any-return]
-        return self.name, "linked", self._get_module_for_linking().as_bitcode()
+        return self.name, "linked", self._final_module.as_bitcode()
 
     @classmethod
     def _unserialize(cls, codegen: Any, state: tuple[str, str, Any]) -> Any:
