@@ -54,10 +54,11 @@ def _solid() -> None:
 
 def _curve() -> None:
     """Compile what fits a centreline: a photograph comes to it last."""
-    from ..vision.curve.fit import Smooth, solve
+    from ..vision.curve.fit import solve
     from ..vision.curve.joints import find_joints
     from ..vision.curve.moment import weighed_fit
     from ..vision.curve.problem import SHARED, pose
+    from ..vision.curve.spline import Smooth
 
     s = np.linspace(0.0, 200.0, 201)
     points, theta, ones = np.column_stack((s, np.zeros_like(s))), 0.0 * s, np.ones(201)

@@ -8,8 +8,9 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from numba.core import sigutils, types
+from numba.core import sigutils
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.types import BooleanLiteral, IntegerLiteral, unliteral
 
 from .linked import linked
 
@@ -67,8 +68,7 @@ def _emitted(compiled: Any, result: Any) -> Any:
 
 def _plain(kind: Any) -> Any:
     """Return the type of a number that a call writes out: it is worth no version."""
-    numbers = (types.IntegerLiteral, types.BooleanLiteral)
-    return types.unliteral(kind) if isinstance(kind, numbers) else kind
+    return unliteral(kind) if isinstance(kind, IntegerLiteral | BooleanLiteral) else kind
 
 
 @contextmanager
