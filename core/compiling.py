@@ -68,7 +68,8 @@ def _emitted(compiled: Any, result: Any) -> Any:
 
 def _plain(kind: Any) -> Any:
     """Return the type of a number that a call writes out: it is worth no version."""
-    return unliteral(kind) if isinstance(kind, IntegerLiteral | BooleanLiteral) else kind
+    is_written = isinstance(kind, IntegerLiteral | BooleanLiteral)
+    return unliteral(kind) if is_written else kind
 
 
 @contextmanager
