@@ -10,7 +10,7 @@ from typing import Any
 
 from numba.core import sigutils
 from numba.core.compiler_lock import global_compiler_lock
-from numba.core.types import BooleanLiteral, IntegerLiteral, unliteral
+from numba.core.types import BooleanLiteral, IntegerLiteral
 
 from .linked import linked
 
@@ -69,7 +69,7 @@ def _emitted(compiled: Any, result: Any) -> Any:
 def _plain(kind: Any) -> Any:
     """Return the type of a number that a call writes out: it is worth no version."""
     is_written = isinstance(kind, IntegerLiteral | BooleanLiteral)
-    return unliteral(kind) if is_written else kind
+    return kind.literal_type if is_written else kind
 
 
 @contextmanager
