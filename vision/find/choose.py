@@ -12,7 +12,14 @@ from ..edge.state import LostError
 from ..picture.photo import Photo
 from .binarise import Binary, binarise, rebinarise
 from .candidate import Candidate
-from .ground import FAINT, LEVELS, View, best_view, ground_distance
+from .ground import (
+    FAINT,
+    LEVELS,
+    View,
+    best_view,
+    ground_distance,
+    other_ground,
+)
 from .lines import beyond_lines, without_lines
 from .rivals import TOLD, alike, are_halves, bound, standing_out, too_many
 from .rod import LEAST_SHARE, find_candidates
@@ -31,6 +38,9 @@ _NO_CLAMP = (
 )
 _DARK = 0.25
 """Light of a rod, over the paper's, that no mix of colours tells much better."""
+
+_GROUNDS = 3
+"""Grounds that things are told from, one after the other."""
 
 LEAST_LENGTH, LEAST_HELD = 0.08, 0.045
 """Shortest rod, in diagonals of the picture: below that it is dust, hair or print; and
@@ -83,23 +93,35 @@ def likely_rods(photo: Photo, sought: Sought) -> Iterator[Candidate]:
     LostError
         If another one is as likely, with the axes of what was seen.
     """
-    binary = ground_distance(photo)
-    unlined = without_lines(binary)
     several, seen = None, False
-    for picture in (binary,) if unlined is None else (unlined, binary):
-        if seen and unlined is not None:
-            picture = beyond_lines(binary, unlined)  # a line is no rod either
-        try:
-            for rod in _in_picture(photo, sought, picture):
-                if rod.root == "clamp" or not seen:
-                    yield replace(rod, rivalled=rod.rivalled or seen)
-                seen = True
-        except LostError as lost:
-            several = several or lost
-            if lost.flag == "two_rods":
-                break
+    for ground in _grounds(photo):
+        unlined = without_lines(ground)
+        for picture in (ground,) if unlined is None else (unlined, ground):
+            if seen and unlined is not None:
+                picture = beyond_lines(ground, unlined)  # a line is no rod either
+            try:
+                for rod in _in_picture(photo, sought, picture):
+                    if rod.root == "clamp" or not seen:
+                        yield replace(rod, rivalled=rod.rivalled or seen)
+                    seen = True
+            except LostError as lost:
+                if lost.flag == "two_rods":
+                    raise
+                several = several or lost
     if several is not None:
         raise several
+
+
+def _grounds(photo: Photo) -> Iterator[Binary]:
+    """Yield how far pixels are from the ground, and from others that are as large."""
+    known = [ground_distance(photo)]
+    yield known[0]
+    while len(known) < _GROUNDS:
+        other = other_ground(photo, known)
+        if other is None:
+            return
+        yield other
+        known.append(other)
 
 
 def _in_picture(photo: Photo, sought: Sought, binary: Binary) -> Iterator[Candidate]:

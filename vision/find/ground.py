@@ -8,6 +8,7 @@ on a green board of the same lightness is as far from it as a grey one from whit
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -33,6 +34,13 @@ _FALLS_OFF, _GRAIN = 0.4, 0.006
 """Pixels that tell the paper's light, and of it, once fitted, one of so many along and
 across; by how much it may fall off across the picture,
 as a logarithm; and how far noise scatters dark ones."""
+
+_OTHER, _LARGE, _BLACK = 0.2, 0.1, 1e-3
+"""Distance from the first ground of what may be another, the least part of the picture
+that is one, and light that is told from none."""
+
+_SEEDS, _LEAST_SAMPLE = 5, 60
+"""One of so many pixels may be of the commonest colour; and fewer tell none."""
 
 LUMINANCE = (0.114, 0.587, 0.299)
 """Weights of blue, green and red in lightness: of their light here, but of their values
@@ -82,13 +90,53 @@ def ground_distance(photo: Photo) -> Binary:
 
     Its mask is empty; `rebinarise` makes one at a level.
     """
+    small, factor = _small(photo)
+    return _distance(small, factor, np.ones(small.shape[:2], np.bool_))
+
+
+def other_ground(photo: Photo, known: Sequence[Binary]) -> Binary | None:
+    """Return the same for another ground, as a mat half under a sheet is.
+
+    Parameters
+    ----------
+    photo : Photo
+        The photograph.
+    known : sequence of Binary
+        How far from its other grounds the pixels are.
+
+    Returns
+    -------
+    Binary or None
+        None where nothing else is large.
+    """
+    small, factor = _small(photo)
+    nearest = np.max([binary.ratio for binary in known], axis=0)
+    rest = nearest < 1.0 - _OTHER
+    logs = np.log(np.maximum(small, _BLACK))
+    sample = logs[rest]
+    sample = sample[:: max(1, len(sample) // _SAMPLE)]
+    if len(sample) < _LEAST_SAMPLE:
+        return None
+    seeds = sample[::_SEEDS]
+    near = np.abs(sample - seeds[:, None]).max(axis=2) < 0.5 * _FALLS_OFF
+    middle = np.median(sample[near[np.argmax(near.sum(axis=1))]], axis=0)
+    ground = rest & (np.abs(logs - middle).max(axis=2) < _FALLS_OFF)
+    return _distance(small, factor, ground) if ground.mean() > _LARGE else None
+
+
+def _small(photo: Photo) -> tuple[Image, int]:
+    """Return the working picture, (h, w, 1 or 3), and its factor."""
     factor = max(1, round(max(photo.grey.shape) / WORK_PX))
     colour = photo.colour()
     light = photo.grey[..., None] if colour is None else colour
     small = shrunk(light, factor)
+    return small.reshape(*small.shape[:2], -1), factor
+
+
+def _distance(small: Image, factor: int, ground: NDArray[np.bool_]) -> Binary:
+    """Return the distance from the commonest light of what may be the ground."""
     height, width = small.shape[:2]
-    small = small.reshape(height, width, -1)
-    bare = [_paper_light(small[..., k]) for k in range(small.shape[2])]
+    bare = [_paper_light(small[..., k], ground) for k in range(small.shape[2])]
     typical = np.array([np.median(each[::_EVERY, ::_EVERY]) for each in bare])
     shade = [each / light for each, light in zip(bare, typical, strict=True)]
     level = np.clip(small / cv2.merge(shade).reshape(small.shape), 0.0, 1.5)
@@ -185,7 +233,7 @@ def box_about(points: Array) -> tuple[slice, slice]:
     return slice(top, bottom + 1), slice(left, right + 1)
 
 
-def _paper_light(work: Image) -> Image:
+def _paper_light(work: Image, ground: NDArray[np.bool_]) -> Image:
     """Return the light on the bare paper in one channel: a quadric through its mode.
 
     The commonest light is the paper's, give or take what it falls off; what is not
@@ -193,8 +241,9 @@ def _paper_light(work: Image) -> Image:
     """
     height, width = work.shape
     step = max(1, int((height * width / _SAMPLE) ** 0.5))
-    sample = work[::step, ::step]
+    sample, among = work[::step, ::step], ground[::step, ::step].ravel()
     basis, value = quadric(*sample.shape), np.maximum(sample, 1e-4).ravel()
+    basis, value = basis[among], value[among]
     logs = np.sort(np.log(value.astype(np.float64)))
     within = np.searchsorted(logs, logs + _FALLS_OFF) - np.arange(logs.size)
     first = int(np.argmax(within))
