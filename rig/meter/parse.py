@@ -13,6 +13,9 @@ from .protocol import Sample
 _INSTRUMENT_INFINITY = 9.8e37
 """SCPI: 9.9E37 and beyond is infinity, which meters send when overloaded."""
 
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}(\.\d{3})+,\d*")
+"""Points between thousands, which a decimal comma proves."""
+
 _LONGEST = 256
 """Characters of a reply; a longer one is garbled, whatever it matches."""
 
@@ -107,6 +110,8 @@ def parse_multiplier(description: MeterDescription, reply: str) -> float:
 def _value(description: MeterDescription, groups: dict[str, str]) -> float:
     text = groups["value"].replace(" ", "")
     if description.read.decimal_comma:
+        if "." in text and not _THOUSANDS.fullmatch(text):
+            raise ValueError("a decimal point where commas are decimal")
         text = text.replace(".", "").replace(",", ".")
     value = float(text)
     if groups.get("decimals"):

@@ -82,6 +82,9 @@ def test_decimal_comma_and_status_words() -> None:
     )
     assert parse_reply(description, "N -1.038,25").flux_mT == pytest.approx(-1038.25)
     assert parse_reply(description, "E 38,25").outcome == "overload"
+    # A point that no comma proves to stand between thousands may be a decimal one.
+    for reply in ("N 38.05", "N 38.050", "N 1.03,25", "N 1,038.25"):
+        assert parse_reply(description, reply).outcome == "garbled"
 
 
 def test_a_row_with_one_overload_is_overloaded() -> None:
