@@ -30,7 +30,7 @@ EDGE_MM = 0.0005
 
 ALIKE_TIP = 3.0
 """Of an end, over what its lanes scatter by: they share shade, samples and levels."""
-FACE_SEEN, FACE_HIDDEN = 0.05, 0.01
+FACE_SEEN, FACE_HIDDEN = 0.08, 0.02
 """And in widths of its face: where the camera sees it, or it is not dark, so that its
 light is not known; where its lower edge is hidden."""
 PALE_TIP = 0.25
