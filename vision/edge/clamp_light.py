@@ -34,9 +34,9 @@ _ON, _BESIDE = 0.3, (0.9, 2.0)
 _LEAST = 20
 """Pixels that tell a colour."""
 
-_CLEAR, _FOR = 8.0, 1.0
+_CLEAR, _FOR, _SEEN = 8.0, 1.0, 1.0
 """Deviations of what is rod by which something else is told from it, and widths at a
-stretch over which it is."""
+stretch over which it is; and deviations that do where it is known to begin."""
 
 _SHADE, _LAMP, _NOISE = 0.4, 0.15, 0.004
 """Shares of the light, as deviations: what shade takes, and by how much paper may be
@@ -62,7 +62,7 @@ class ClampLight:
 
 
 def clamp_light(
-    photo: Photo, curve: Curve, first: float, width: float
+    photo: Photo, curve: Curve, first: float, width: float, root: float | None = None
 ) -> ClampLight | None:
     """Return the light in which the clamp of a rod is seen.
 
@@ -74,6 +74,8 @@ def clamp_light(
         The axis, from about the clamp to the tip.
     first, width : float
         About where the rod begins on it, and its width, px.
+    root : float, optional
+        Where it begins, if that is known better; else where its colour ends.
 
     Returns
     -------
@@ -94,8 +96,10 @@ def clamp_light(
     rod = _Kind.of(on[ahead])
     if rod is None:
         return None
-    other = rod.away(np.median(on, axis=1)) > _CLEAR
-    root = _begins(other, s, _FOR * width)
+    least = _CLEAR if root is None else _SEEN
+    if root is None:
+        other = rod.away(np.median(on, axis=1)) > _CLEAR
+        root = _begins(other, s, _FOR * width)
     if root is None:
         return None
     behind = (s > root - 2.0 * width) & (s < root - 0.25 * width)
@@ -107,7 +111,7 @@ def clamp_light(
     if paper is None:
         return None
     share = _LAMP if clamp.sum() > paper.middle.sum() else _SHADE
-    if paper.away(clamp, share) < _CLEAR:
+    if paper.away(clamp, share) < least or rod.away(clamp) < _SEEN:
         return None
     seen = np.full((2, *shape), np.nan, np.float32)
     for image, mix in zip(

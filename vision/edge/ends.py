@@ -67,9 +67,12 @@ def find_ends(
     if root == "free":
         return tip, None, _other_end(grey, state, sign, outwards, reach)
     lines = ClampLines(face=None, front=None)
-    if state.clamp_light is None:
+    rough = state.from_front and not fine
+    if rough or state.clamp_light is None:
         lines = _clamp_lines(grey, state, seen, sign, fine=fine)
-    if lines.face is None and lines.front is None:
+    if rough:
+        lines = _nearer(lines, _in_own_light(state, fine=fine), state)
+    elif lines.face is None and lines.front is None:
         lines = _in_own_light(state, fine=fine)
     elif state.plain is not None:
         lines = _with_front(lines, state.plain, state, seen, fine=fine)
@@ -91,7 +94,7 @@ def _clamp_lines(
 
     width, contrast = state.width, seen.edges.contrast
     low, high = state.first - 0.3 * width - 3.0, state.first + 0.3 * width + 3.0
-    if not fine:
+    if not (fine or state.from_front):
         low, high = state.first - 1.55 * width, state.first + 1.05 * width
     lines = between_places(low, high, contrast)
     if lines.face is None and lines.front is None:
@@ -132,6 +135,19 @@ def _in_own_light(state: State, *, fine: bool) -> ClampLines:
         )  # fmt: skip
 
     return ClampLines(face=seen_in(light.rod).face, front=seen_in(light.paper).front)
+
+
+def _nearer(plain: ClampLines, own: ClampLines, state: State) -> ClampLines:
+    """Return the lines that are nearer to a front which is known; keep their light."""
+
+    def away(lines: ClampLines) -> float:
+        seen = [line.s for line in (lines.face, lines.front) if line is not None]
+        return min((abs(s - state.first) for s in seen), default=np.inf)
+
+    if away(own) < away(plain):
+        return own
+    state.clamp_light = None
+    return plain
 
 
 def _with_front(

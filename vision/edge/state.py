@@ -47,7 +47,8 @@ class State:
     `plain` is the picture's own light where the rod is seen in a mix of colours.
     `photo` has its colours, and `clamp_light` those that show a clamp where the light
     that shows the rod does not.
-    At the places `hidden` (x, y, radius) something lies across it.
+    `from_front` tells that the curve begins at the front of a clamp, which was seen in
+    all colours. At the places `hidden` (x, y, radius) something lies across it.
     """
 
     curve: Curve
@@ -68,6 +69,7 @@ class State:
     plain: NDArray[np.float32] | None = None
     photo: Photo | None = None
     clamp_light: ClampLight | None = None
+    from_front: bool = False
 
     @property
     def optics(self) -> tuple[float, ...]:

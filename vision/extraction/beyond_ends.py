@@ -19,6 +19,7 @@ from ..edge.edges import clear_of
 from ..edge.lanes import lanes
 from ..edge.state import LostError, Root
 from ..find.ground import View
+from ..find.held import seen_behind
 from ..picture.photo import Photo
 from .refine import Refined
 from .strip import GRID, Strip, along_rod
@@ -75,8 +76,9 @@ def check_ends(
     """Refuse a rod in a clamp whose root is on bare paper, or whose tip meets a body.
 
     A clamp may be as light as the paper in the light that tells the rod best, but
-    hardly in all colours. What enters at the border and ends at a body is a rod whose
-    tip is not in the picture, turned round.
+    hardly in all colours; and what goes on behind it is no rod where they say so. What
+    enters at the border and ends at a body is a rod whose tip is not in the picture,
+    turned round.
 
     Raises
     ------
@@ -100,7 +102,8 @@ def check_ends(
             "no_clamp",
             "what looks like a rod begins on bare paper: no clamp is seen there",
         )
-    if goes_on_behind(strip):
+    axis, width = refined.fit.curve.points, refined.typical_width
+    if goes_on_behind(strip) and seen_behind(photo, axis, width):
         raise LostError(
             "touches_object",
             "what looks like a rod goes on behind what it grows from: something "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -20,6 +21,7 @@ from ..find.candidate import Candidate
 from ..find.choose import find_rod, likely_rods, seen_best
 from ..find.coloured import shows_another
 from ..find.ground import View
+from ..find.held import held
 from ..find.shadeless import in_its_colour, in_lightness
 from ..find.sought import Sought
 from ..find.track import Start, start_curve
@@ -187,7 +189,7 @@ def _searched(photo: Photo, setting: Setting, sought: Sought) -> Measurement:
 def _seen(photo: Photo, setting: Setting, rod: Candidate, view: View) -> Measurement:
     """Measure a rod, with its edges farther aside if there are none nearer."""
     try:
-        return measure_candidate(photo, setting, rod, view)
+        return _from_front(photo, setting, rod, view)
     except LostError as lost:
         if isinstance(lost, _TooWideError):
             return doubted(lost.found)
@@ -205,9 +207,24 @@ def _measured(
 ) -> Measurement:
     """Measure what was found; a refusal shows it."""
     try:
-        return measure_candidate(photo, setting, rod, view)
+        return _from_front(photo, setting, rod, view)
     except LostError as lost:
         raise LostError(lost.flag, lost.reason, [rod.points_px]) from None
+
+
+def _from_front(
+    photo: Photo, setting: Setting, rod: Candidate, view: View
+) -> Measurement:
+    """Measure a rod, from the front that all colours show if its own light does not."""
+    try:
+        return measure_candidate(photo, setting, rod, view)
+    except LostError as lost:
+        told = lost.flag != "no_clamp" or rod.from_front
+        whole = None if told else held(photo, rod)
+        with suppress(LostError):
+            if whole is not None:
+                return measure_candidate(photo, setting, whole, view)
+        raise
 
 
 def measure_candidate(
@@ -369,7 +386,7 @@ def _refined(
         joints=setting.joints_px, walls=setting.walls_px if walls else None,
         face_px=setting.face_px(start.curve), sd_px=sd_px,
         known_joints=joints, plain=None if view.plain else photo.grey,
-        hidden_px=candidate.hidden_px, photo=photo,
+        hidden_px=candidate.hidden_px, photo=photo, from_front=candidate.from_front,
     )  # fmt: skip
     if start.blur > FAR * start.width:
         lost = refined.blur > TOO_FAR * refined.typical_width
@@ -400,7 +417,7 @@ def _told(photo: Photo, setting: Setting, curve: Curve) -> TaggedClamp | None:
 def _start(grey: Image, candidate: Candidate, sign: float, blur: float = 1.0) -> Start:
     start = start_curve(
         grey, candidate.points_px, candidate.width_px, sign=sign,
-        follow=candidate.root == "clamp", blur=blur,
+        follow=candidate.root == "clamp", blur=blur, whole=candidate.from_front,
     )  # fmt: skip
     if start is None:
         raise LostError("edges_lost", "the rod has no two edges against the paper")

@@ -20,7 +20,12 @@ from ..find.ground import View
 from ..find.rod_colour import ALIKE, distance_from
 from ..measurement import Measurement
 from ..picture.photo import Photo
-from .beyond_ends import check_ends, goes_on_after_gap, tip_goes_on
+from .beyond_ends import (
+    check_ends,
+    goes_on_after_gap,
+    goes_on_behind,
+    tip_goes_on,
+)
 from .crossing import over_paper
 from .deviations import scale_sd
 from .one_width import is_uneven
@@ -60,6 +65,10 @@ BLURRED_PX, BLURRED = 1.8, 0.08
 
 SHADE_PX = 0.04
 """Pull of a shade on the midline, before correction, above which it is named."""
+
+OFF_FRONT = 0.15
+"""How far from the front that is seen beside it a rod may begin, in widths: two of
+three are nearer."""
 
 UNRESOLVED, SMEARED = 0.21, 0.075
 """Blur, in widths, above which a clamp's front and its shade are seen as one line where
@@ -115,7 +124,10 @@ def doubts_around(
         found.add(OTHER_ROD)
     face_px = setting.face_px(refined.fit.curve)
     darkest = DARKEST if view.plain else DIMMED
-    if candidate.root == "clamp" and _goes_on(strip, refined, face_px, darkest):
+    behind = refined.clamp is not None and not refined.rough and goes_on_behind(strip)
+    if behind or (
+        candidate.root == "clamp" and _goes_on(strip, refined, face_px, darkest)
+    ):
         found.add(CLAMP_DOUBTFUL)
     if not refined.rough and tip_goes_on(photo, strip, refined):
         found.add(TIP_GOES_ON)
@@ -168,6 +180,7 @@ def doubts(
     unclear = candidate.root == "clamp" and _front_in_shade(refined, pull)
     if (
         unclear
+        or _is_off_front(refined, candidate)
         or (result.inverted and _lines_differ(refined))
         or CLAMP_DOUBTFUL in around
     ):
@@ -208,6 +221,18 @@ def _front_in_shade(refined: Refined, pull: float) -> bool:
     width = refined.typical_width
     smeared = smeared_px(refined, refined.clamp.blur) > SMEARED * width
     return smeared or (pull > SHADE_PX and refined.blur > UNRESOLVED * width)
+
+
+def _is_off_front(refined: Refined, candidate: Candidate) -> bool:
+    """Whether not both lines at a clamp are seen where all colours show its front."""
+    lines = refined.clamp
+    if not candidate.from_front or lines is None:
+        return False
+    if lines.face is None or lines.front is None or _lines_differ(refined):
+        return True
+    root, _ = refined.fit.curve.at(np.zeros(1))
+    away = np.hypot(*(root[0] - candidate.points_px[0]))
+    return bool(away > OFF_FRONT * refined.typical_width + APART_PX)
 
 
 def _lines_differ(refined: Refined) -> bool:

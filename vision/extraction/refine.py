@@ -17,6 +17,7 @@ from ..curve.problem import SHARED, pose
 from ..curve.robust import _median, median
 from ..curve.spline import Smooth
 from ..edge.clamp import ClampLines
+from ..edge.clamp_light import clamp_light
 from ..edge.crossings import EndFace
 from ..edge.edges import find_edges
 from ..edge.ends import find_ends
@@ -135,6 +136,7 @@ def refine(
     plain: Image | None = None,
     photo: Photo | None = None,
     hidden_px: Array | None = None,
+    from_front: bool = False,
 ) -> Refined:
     """Measure axis, edges and ends.
 
@@ -167,6 +169,8 @@ def refine(
         The photograph, whose colours may show a clamp that `grey` does not.
     hidden_px : ndarray, shape (k, 3), optional
         Places (x, y, radius) where something lies across the rod.
+    from_front : bool
+        Whether the start begins at the front of a clamp that `grey` does not show.
 
     Raises
     ------
@@ -177,8 +181,10 @@ def refine(
     last = float(start.curve.s[-1])
     state = State(
         start.curve, half, start.width, 0.0, last, face_px, start.rough, start.blur,
-        hidden=hidden_px, plain=plain, photo=photo,
+        hidden=hidden_px, plain=plain, photo=photo, from_front=from_front,
     )  # fmt: skip
+    if from_front and photo is not None:
+        state.clamp_light = clamp_light(photo, start.curve, 0.0, start.width, root=0.0)
     seeking = sd_px > _SURE_PX
     seen = _look(grey, state, sign, 0, seeking=seeking)
     first, end, still_px = 0.0, last, _NEAR_STILL_PX

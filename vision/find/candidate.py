@@ -41,6 +41,8 @@ class Candidate:
         Whether another thing lies so close along it that both may be one rod.
     off_colour : float
         Distance of its colour from the rod's, CIELAB; 0 where that is not known.
+    from_front : bool
+        Whether it begins at the front of a clamp that its own light does not show.
     hidden_px : ndarray, shape (k, 3)
         Places (x, y, radius) where something lies across it.
     """
@@ -55,6 +57,7 @@ class Candidate:
     rivalled: bool = False
     halved: bool = False
     off_colour: float = 0.0
+    from_front: bool = False
     hidden_px: Array = field(default_factory=lambda: np.zeros((0, 3)))
 
     @property

@@ -20,6 +20,7 @@ from .ground import (
     ground_distance,
     other_ground,
 )
+from .held import as_held
 from .lines import beyond_lines, without_lines
 from .rivals import TOLD, alike, are_halves, bound, standing_out, too_many
 from .rod import LEAST_SHARE, find_candidates
@@ -31,11 +32,6 @@ from .two_colours import in_parts
 
 Array = NDArray[np.float64]
 
-_NO_CLAMP = (
-    "no clamp is seen at either end of the rod, nor a border of the picture: give the "
-    "clamp another colour than the ground; for a rod that floats freely say --free "
-    "(from Python: clamp='none')"
-)
 _DARK = 0.25
 """Light of a rod, over the paper's, that no mix of colours tells much better."""
 
@@ -59,7 +55,7 @@ def find_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
     if binary is None:
         raise LostError("no_rod", "nothing stands out from the background")
     try:
-        rod = _choose(binary, sought)
+        rod = _choose(photo, binary, sought)
     except LostError as lost:
         # Glints make grey paper look like a dark board.
         if lost.flag != "no_rod" or sought.invert is not None or not binary.inverted:
@@ -67,7 +63,7 @@ def find_rod(photo: Photo, sought: Sought) -> tuple[Candidate, View]:
         dark = binarise(photo.grey, invert=False)
         if dark is None:
             raise
-        binary, rod = dark, _choose(dark, sought)
+        binary, rod = dark, _choose(photo, dark, sought)
     view = View(grey=photo.grey, sign=-1.0 if binary.inverted else 1.0)
     if rod.ratio < _DARK or binary.inverted:
         return rod, view
@@ -152,7 +148,7 @@ def seen_best(photo: Photo, sought: Sought, rod: Candidate) -> tuple[Candidate, 
         If it is not held at one end alone, or not as light as was told.
     """
     if rod.root == "free" and sought.clamp != "none":
-        raise LostError("no_clamp", _NO_CLAMP)
+        rod = as_held(photo, rod)
     view = best_view(photo, _accept(rod).points_px, rod.width_px)
     rod, view = in_parts(photo, rod, view)
     lighter = view.sign < 0.0
@@ -209,7 +205,7 @@ def _compare_colours(photo: Photo, colour: str, things: list[Thing]) -> None:
         ]
 
 
-def _choose(binary: Binary, sought: Sought) -> Candidate:
+def _choose(photo: Photo, binary: Binary, sought: Sought) -> Candidate:
     """Return the rod; a paler clamp shows only at higher levels."""
     best: Candidate | None = None
     least = LEAST_LENGTH * binary.factor * float(np.hypot(*binary.mask.shape))
@@ -236,9 +232,7 @@ def _choose(binary: Binary, sought: Sought) -> Candidate:
         best = best or rod
     if best is None:
         raise LostError("no_rod", "nothing in the picture is long and thin like a rod")
-    if sought.clamp == "none":
-        return best
-    raise LostError("no_clamp", _NO_CLAMP)
+    return best if sought.clamp == "none" else as_held(photo, best)
 
 
 def _levels(binary: Binary) -> list[float]:

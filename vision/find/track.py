@@ -70,7 +70,7 @@ class Start:
 
 def start_curve(
     grey: Image, points: Array, width: float, *, sign: float, follow: bool,
-    blur: float = 1.0,
+    blur: float = 1.0, whole: bool = False,
 ) -> Start | None:  # fmt: skip
     """Centre a rough curve between its edges and carry it towards the clamp.
 
@@ -88,6 +88,8 @@ def start_curve(
         Whether to carry the curve on at the root; at the tip it always is.
     blur : float
         Standard deviation of the picture's blur, px: where paper is looked for.
+    whole : bool
+        Whether the rough curve begins at the root, as surely as that can be told.
 
     Returns
     -------
@@ -116,7 +118,10 @@ def start_curve(
         centres = _means(centres, max(1, round(real / s[1])))
     else:
         centres = centres[:: max(1, round(0.4 * real / s[1]))]
-    if follow:
+    if whole:
+        shaded = along[: int(np.argmax(good))]
+        centres = np.vstack([shaded[:: max(1, round(0.4 * real / s[1]))], centres])
+    elif follow:
         centres = _follow(grey, centres[2:], real, sign, dark, level, blur)
     centres = _follow(grey, centres[::-1], real, sign, dark, level, blur)[::-1]
     return Start(
