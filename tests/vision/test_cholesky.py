@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from magbend.vision.curve.cholesky import factor, inverse, solved, solved_half, squared
-from magbend.vision.curve.robust import median, quantile
+from magbend.vision.curve.robust import median, quantile, quantiles
 
 
 @settings(max_examples=20, deadline=None)
@@ -38,3 +38,10 @@ def test_medians_leave_nan_out():
     assert quantile(values, 1.0) == 10.0
     assert np.isnan(median(values[:1]))
     assert np.isnan(quantile(values[:0], 0.5))
+
+
+def test_quantiles_of_rows_are_those_of_each():
+    rows = np.random.default_rng(2).normal(size=(5, 40))
+    rows[2, ::3] = np.nan
+    each = [quantile(row, 0.25) for row in rows]
+    np.testing.assert_array_equal(quantiles(rows, 0.25), each)

@@ -104,6 +104,21 @@ def test_what_is_known_of_a_rod_at_rest_is_not_looked_for_again(first, monkeypat
     np.testing.assert_allclose(found.joints_px, first.joints_px, atol=1.0)
 
 
+def test_ends_wait_until_a_rod_that_moved_is_found(first, monkeypatch):
+    asked, find_ends = [], refine_module.find_ends
+
+    def noted(*args, **options):
+        asked.append(args)
+        return find_ends(*args, **options)
+
+    monkeypatch.setattr(refine_module, "find_ends", noted)
+    monkeypatch.setattr(follow_module, "measure", no_full_search)
+    drawn = frame(43.0)
+    found = follow(as_photo(drawn.image), SETTING, first)
+    assert error_px(found, drawn) < 0.03
+    assert len(asked) == 2
+
+
 def test_joints_are_sought_again_where_a_rod_is_more_bent():
     found = follow(as_photo(frame(1.0).image), SETTING)
     straight = found

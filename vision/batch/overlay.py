@@ -22,7 +22,9 @@ MARK: Colour = (60, 200, 60)
 WRONG: Colour = (40, 40, 230)
 _SHIFT = 4  # cv2 takes fixed-point coordinates with this many binary digits
 
-_GREYS = 0xF0  # noise in the last bits would multiply size and time of the file
+_SHADES = encode_srgb(np.linspace(0.0, 1.0, 256, dtype=np.float32)) & np.uint8(0xF0)
+"""Of light in 255 parts; noise in the last bits would multiply size and time of the
+file."""
 
 MAX_SIDE_PX = 2400
 """Larger photographs are shown at a reduced scale."""
@@ -63,9 +65,9 @@ def draw_overlay(
         kind = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_NEAREST
         grey = np.asarray(cv2.resize(grey, size, interpolation=kind))
     white = float(np.quantile(grey[::8, ::8], 0.995))
-    encoded = encode_srgb(np.asarray(grey / max(white, 1e-6) * 0.9, dtype=np.float32))
-    coarse = encoded & np.uint8(_GREYS)
-    picture = np.asarray(cv2.cvtColor(coarse, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
+    light = cv2.convertScaleAbs(grey, alpha=0.9 * 255.0 / max(white, 1e-6))
+    shades = cv2.LUT(light, _SHADES)
+    picture = np.asarray(cv2.cvtColor(shades, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
     if measurement.ok:
         _draw_found(picture, measurement, scale)
     else:

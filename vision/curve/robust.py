@@ -18,6 +18,11 @@ def quantile(values: NDArray[np.floating], part: float) -> float:
     return float(_quantile(values, part))
 
 
+def quantiles(rows: NDArray[np.floating], part: float) -> NDArray[np.float64]:
+    """Return the `quantile` of each row of an array, shape (k, n)."""
+    return np.asarray(_quantiles(rows, part))
+
+
 @njit(cache=True)
 def _median(values: NDArray[np.floating]) -> float:
     return float(np.nanmedian(values))
@@ -26,3 +31,11 @@ def _median(values: NDArray[np.floating]) -> float:
 @njit(cache=True)
 def _quantile(values: NDArray[np.floating], part: float) -> float:
     return float(np.nanquantile(values, part))
+
+
+@njit(cache=True)
+def _quantiles(rows: NDArray[np.floating], part: float) -> NDArray[np.float64]:
+    out = np.empty(len(rows))
+    for k in range(len(rows)):
+        out[k] = _quantile(rows[k], part)
+    return out

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...core.jit import njit
 from ..curve.curve import Curve
-from ..curve.robust import median
+from ..curve.robust import median, quantiles
 from .crossings import Crossed, EndFace, crossings_of, line_through
 from .edges import clear_of
 from .lanes import lanes, lanes_along
@@ -268,7 +268,7 @@ def is_dark_line(before: Array, behind: Array, darkest: float) -> bool:
     rod, paper = median(before[1:4].ravel()), median(before[::4].ravel())
     if paper == rod:
         return False
-    light = np.array([median(lane) for lane in behind])
+    light = quantiles(behind, 0.5)
     light = (light - rod) / (paper - rod)
     lighter = min(light[0], light[4]) - max(light[1:4].max(), 0.0)
     return bool(light[1:4].max() < darkest and lighter > 0.12)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.jit import njit
-from ..curve.robust import median, quantile
+from ..curve.robust import median, quantile, quantiles
 from ..edge.edges import clear_of
 from ..edge.lanes import lanes
 from ..edge.state import LostError, Root
@@ -178,7 +178,7 @@ def _around_tip(strip: Strip, refined: Refined) -> tuple[float, Array, Array]:
     near = end + clear_of(refined.blur) + 1.0
     body = strip.between(near, near + _BODY_PX)
     across = strip.lanes(*np.linspace(-_WIDE, _WIDE, 7))
-    level = np.array([median(lane[body]) for lane in across])
+    level = quantiles(across[:, body], 0.5)
     rod = median(strip.lanes(0.0)[0, fore])
     return rod, _sides(strip, refined)[:, :, fore], level
 
@@ -228,7 +228,7 @@ def _sharp_edge(strip: Strip, end: float) -> float:
     )  # fmt: skip
     step = outer - inner
     sharp = np.where(step > _SHARP * (away - deep), step, 0.0)
-    return max(quantile(lane, 0.25) for side in sharp for lane in side)
+    return float(quantiles(sharp.reshape(-1, sharp.shape[2]), 0.25).max())
 
 
 def _tinted(photo: Photo, refined: Refined) -> bool:

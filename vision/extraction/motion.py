@@ -90,7 +90,8 @@ def moved_on(
 
 def _carried(motion: Motion) -> Array:
     """Return the state one frame on."""
-    return np.asarray(np.tensordot(_STEP, motion.state_px, axes=1))
+    state = motion.state_px
+    return np.asarray((_STEP @ state.reshape(3, -1)).reshape(state.shape))
 
 
 def _covariance(motion: Motion) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -34,18 +35,17 @@ Image = NDArray[np.float32]
 _PASSES = 5
 _NEAR_PX = 0.4
 """The first pass, or the first two, only seek the rod: on every other station, with a
-supple curve; after the first its ends can wait. Two where it moved by more."""
+supple curve. Two where the first moved it by more; its ends can wait, in a film until
+it is found."""
 _SURE_PX = 0.25
 """A start that is so sure need not be sought."""
-_STILL_PX, _ENDS_STILL_PX = 0.05, 0.5
-"""By how much the curve and its ends may move when all is found: the next pass would
-move it by a tenth of that. The ends are those of the curve as it is then, which an arc
-carries on so far."""
+_STILL_PX, _NEAR_STILL_PX = (0.05, 0.5), (0.08, 1.0)
+"""By how much the curve and its ends may move when all is found, and in a film, where
+time counts: the next pass would move it by a tenth of that. The ends are those of the
+curve as it is then, which an arc carries on so far."""
 _PULLED_STILL_PX, _PULLED_PX = 0.02, 0.02
 """By how much where half of the midline is pulled by so much, by shade, or by blur
 where it is bent: the blur is found slowly there, and both hang on it."""
-_NEAR_STILL_PX = 0.08
-"""The first of them in a film, where time counts: what is left is a part of it."""
 _KEPT_PX = 0.05
 """A curve that moves by less keeps its joints, and the light beside white paper."""
 _BLUR_PARTS, _UNEVEN = 8, 0.35
@@ -76,6 +76,8 @@ class Refined:
         Smoothed width.
     sigma_width : ndarray, shape (n,)
         Its standard deviation.
+    typical_width : float
+        Median width where edges were used.
     tip : EndFace
         The free end; s counts as in `fit`.
     clamp : ClampLines or None
@@ -105,6 +107,7 @@ class Refined:
     good: NDArray[np.bool_]
     width: Array
     sigma_width: Array
+    typical_width: float
     tip: EndFace
     clamp: ClampLines | None
     rough: bool
@@ -115,11 +118,6 @@ class Refined:
     walled: float = 0.0
     growth: float = 0.0
     settled: bool = True
-
-    @property
-    def typical_width(self) -> float:
-        """Median width where edges were used."""
-        return median(self.width[self.good])
 
 
 def refine(
@@ -187,10 +185,10 @@ def refine(
         state.clamp_light = clamp_light(photo, start.curve, 0.0, start.width, root=0.0)
     seeking = sd_px > _SURE_PX
     seen = _look(grey, state, sign, 0, seeking=seeking)
-    first, end, still_px = 0.0, last, _NEAR_STILL_PX
-    if not np.isfinite(sd_px):
+    first, end, in_film = 0.0, last, bool(np.isfinite(sd_px))
+    if not in_film:
         tip, lines, first = find_ends(grey, state, seen, root, sign, walls, fine=False)
-        end, still_px = tip.s, _STILL_PX
+        end = tip.s
     places, aside, walled, settled = None, np.inf, 0.0, False
     for turn in range(_PASSES):
         if turn:
@@ -218,18 +216,18 @@ def refine(
         state.curve, state.half = fit.curve, 0.5 * width
         state.first, state.last = 0.0, float(fit.curve.s[-1])
         sought, seeking = seeking, seeking and not turn and aside > _NEAR_PX
-        if sought and not turn:
+        if sought and (in_film or not turn):
             first, end = 0.0, state.last
             continue
         # The ends of the curve as it is now: often they move when it does not.
         tip, lines, first = find_ends(grey, state, seen, root, sign, walls, fine=True)
         end = tip.s
         moved = abs(first) + abs(end - state.last)
-        near_px = still_px
+        still_px, ends_px = _NEAR_STILL_PX if in_film else _STILL_PX
         pulled = shaded + 0.5 * state.blur**2 * np.abs(fit.curve.kappa)
-        if still_px == _STILL_PX and median(pulled) > _PULLED_PX:
-            near_px = _PULLED_STILL_PX
-        settled = aside < near_px and moved < _ENDS_STILL_PX and not sought
+        if not in_film and median(pulled) > _PULLED_PX:
+            still_px = _PULLED_STILL_PX
+        settled = aside < still_px and moved < ends_px and not sought
         if settled:
             break
     curve = fit.curve._replace(s=fit.curve.s - first)
@@ -237,7 +235,8 @@ def refine(
     return Refined(
         fit=replace(fit, curve=curve), shaded=shaded,
         relit=np.interp(at, seen.s, seen.edges.relit(state.blur)), good=used,
-        width=width, sigma_width=sigma_width, tip=tip._replace(s=tip.s - first),
+        width=width, sigma_width=sigma_width, typical_width=median(width[used]),
+        tip=tip._replace(s=tip.s - first),
         clamp=None if lines is None else lines.shifted(first), rough=state.rough,
         blur=state.blur, joints=None if places is None else places - first,
         saturated=white, whole=is_cut_off(grey, seen, sign), walled=walled,
@@ -354,13 +353,13 @@ def _fit(
 
     fit = fitted(weights)
     if not seeking:
-        away = np.abs(np.nan_to_num(fit.residual))
-        outlying = away > 4.0 * np.sqrt(np.mean(away**2)) + 1e-3
+        away = np.where(np.isnan(fit.residual), 0.0, np.abs(fit.residual))
+        outlying = away > 4.0 * math.sqrt(away @ away / away.size) + 1e-3
         left = np.where(outlying, 0.0, weights)
         if outlying.any() and left.sum() > 0.5 * weights.sum():
             weights = left
             fit = fitted(weights)
-    aside = np.nanmax(np.abs(offset - fit.residual))
+    aside = np.abs(offset - fit.residual)[~np.isnan(fit.residual)].max()
     return (
         fit,
         weights > 0.5 * median(weights),

@@ -180,10 +180,13 @@ def _below(
     beside = points[0] + _STEP_PX * (right + line.skew * along)
     first, second = camera.to_mm(np.array([points[0], beside]), height_mm=height_mm)
     start, ahead = camera.to_mm(points, height_mm=axis_mm)
-    sides = np.column_stack([ahead - start, first - second])
-    if abs(np.linalg.det(sides)) < 1e-9:
+    away, step, across = first - start, ahead - start, first - second
+    crossed = float(step[0] * across[1] - step[1] * across[0])
+    if abs(crossed) < 1e-9:
         return line.s
-    return line.s + _STEP_PX * float(np.linalg.solve(sides, first - start)[0])
+    return (
+        line.s + _STEP_PX * float(away[0] * across[1] - away[1] * across[0]) / crossed
+    )
 
 
 def _hidden_root(refined: Refined, ends: LocalView, setting: Setting) -> float:

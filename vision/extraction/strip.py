@@ -79,7 +79,7 @@ class Strip:
 
     def between(self, first: float, last: float) -> slice:
         """Return the stations from one arc length to another, the nearest at least."""
-        low, high = _nearest(self.s, first, last).tolist()
+        low, high = _nearest(self.s, first, last)
         return slice(low, high + 1)
 
     def lanes(self, *across: float) -> Array:
@@ -87,10 +87,10 @@ class Strip:
         return np.asarray(self.light[_nearest(self.across, *across)])
 
 
-def _nearest(grid: Array, *values: float) -> NDArray[np.intp]:
+def _nearest(grid: Array, *values: float) -> list[int]:
     """Return the indices of the values of an even grid that are nearest."""
-    places = np.rint((np.array(values) - grid[0]) / (grid[1] - grid[0]))
-    return np.asarray(places.clip(0, len(grid) - 1), np.intp)
+    first, step, last = float(grid[0]), float(grid[1] - grid[0]), len(grid) - 1
+    return [min(max(round((value - first) / step), 0), last) for value in values]
 
 
 def _sampled(
