@@ -325,3 +325,26 @@ def test_after_an_unanswered_line_the_board_is_reset_before_it_moves():
     words = b"".join(sent)
     assert words.index(b"\x18") < words.index(b"$J")
     assert bench.true_gap_mm == pytest.approx(60.0, abs=0.005)
+
+
+def test_a_door_that_opens_on_the_way_is_named_and_the_stage_stands() -> None:
+    bench = homed_bench()
+    read = bench.board.read
+
+    def open_the_door() -> None:
+        bench.board.receive(b"!")
+        bench.board.read = lambda: (
+            read().replace(b"<Idle", b"<Door:1").replace(b"<Hold:0", b"<Door:1")
+        )
+
+    bench.later(1.0, open_the_door)
+    with pytest.raises(StageTimeoutError, match="state door") as failure:
+        bench.stage.goto_gap(60.0)
+    assert "it stood already" in str(failure.value)
+    assert "cut the power" not in str(failure.value)
+    for motion in (bench.stage.home, lambda: bench.stage.nudge(0.5)):
+        with pytest.raises(StageError, match="its safety door input is open"):
+            motion()
+    del bench.board.read  # closed again
+    bench.stage.home()
+    assert bench.stage.goto_gap(60.0).gap_mm == pytest.approx(60.0, abs=0.005)

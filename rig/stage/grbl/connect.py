@@ -13,6 +13,7 @@ from ..config import StageConfig
 from .audit import is_fluidnc, number
 from .mark import read_mark
 from .protocol import Message, Report, Setting
+from .ready import refuse_open_door
 from .session import CommandRefusedError, GrblSession
 from .stopping import stop_motion
 
@@ -69,7 +70,7 @@ def connect_board(
     mark = read_mark(session) if undisturbed else None  # a reset clears it
     if config.reset_on_connect or report is None or report.state != "idle":
         _reset(session, config)
-    _refuse_open_door(session)
+    refuse_open_door(session)
     restarts = session.restarts
     details = _ask_details(session)
     settings = _ask_settings(session, config)
@@ -135,14 +136,6 @@ def _moving(report: Report) -> bool:
     return report.state in _MOVING_STATES or (
         report.state == "hold" and report.substate != 0
     )
-
-
-def _refuse_open_door(session: GrblSession) -> None:
-    if session.report is not None and session.report.state == "door":
-        raise StageError(
-            "the board is in Door: its safety door input is open, and it takes no line "
-            "until that closes; close it, or tie the input off, then connect again"
-        )
 
 
 def _reset(session: GrblSession, config: StageConfig) -> None:

@@ -23,10 +23,12 @@ _STANDING = ("idle", "alarm", "check", "sleep")
 
 
 def stands(report: Report) -> bool:
-    """Return whether nothing moves: any state at rest, and a completed hold."""
-    return report.state in _STANDING or (
-        report.state == "hold" and report.substate == 0
-    )
+    """Return whether nothing moves: any state at rest, a completed hold, a door open.
+
+    Of a safety door 0 and 1 are standing (closed again, open), 2 and 3 moving.
+    """
+    at_rest = {"hold": (0,), "door": (0, 1)}.get(report.state, ())
+    return report.state in _STANDING or report.substate in at_rest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

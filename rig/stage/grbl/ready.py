@@ -73,11 +73,27 @@ def make_ready(session: GrblSession, trust: PositionTrust, timeout_s: float) -> 
         )
     if report.state == "sleep":
         trust.doubt()  # its motors had been off
-    waits = stuck or report.state in ("hold", "sleep")
+    waits = stuck or report.state in ("hold", "sleep", "door")
     if waits or session.deaf or not session.in_step:
         reset_standing(session, trust)
+    refuse_open_door(session)
     if report.state == "check":
         raise StageError("the board is in check mode ($C); type $C to leave it")
+
+
+def refuse_open_door(session: GrblSession) -> None:
+    """Refuse to go on while the safety door is open.
+
+    Raises
+    ------
+    StageError
+        If it is.
+    """
+    if session.report is not None and session.report.state == "door":
+        raise StageError(
+            "the board is in Door: its safety door input is open, and it takes no line "
+            "until that closes; close it, or tie the input off, then connect again"
+        )
 
 
 def require_unlocked(session: GrblSession) -> None:

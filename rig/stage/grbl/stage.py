@@ -33,6 +33,7 @@ from .protocol import SOFT_RESET, Report, alarm_text, jog_line
 from .ready import (
     make_ready,
     note,
+    refuse_open_door,
     require_open_switch,
     require_unlocked,
     reset_standing,
@@ -164,7 +165,9 @@ class GrblStage(SerialStage[GrblSession]):
             raise StoppedError(stopped(self.stop()))
 
     def _standing_mm(self) -> float:
-        report = self._wait_for_report(self._require_session())
+        session = self._require_session()
+        report = self._wait_for_report(session)
+        refuse_open_door(session)
         here = self._machine_mm()
         if report.state != "idle" or here is None:
             way_out = (
@@ -241,7 +244,7 @@ class GrblStage(SerialStage[GrblSession]):
                 feed_mm_min=self._feed_mm_min,
             )
             state = session.report.state if session.report else ""
-            if state == "hold" or not session.in_step:
+            if state in ("hold", "door") or not session.in_step:
                 reset_standing(session, self._trust)
             return self._take_stop(session, proof)
         except StageError:
