@@ -407,6 +407,22 @@ def test_a_front_that_shade_beside_the_root_leaves_unchecked_is_in_doubt(
     assert ("direction_doubtful" in found.flags) == alone
 
 
+def test_a_rod_wider_than_what_was_told_from_its_shade_is_in_doubt(monkeypatch):
+    """It may be rod and shade, or a rod of which a streak left but a rim."""
+
+    def rim(_, candidate, width):
+        return replace(candidate, width_px=0.5 * width)
+
+    photo = drawn(rod=BLACK, turn_deg=30.0)
+    plain = extract(photo, SCALE)
+    monkeypatch.setattr("magbend.vision.extraction.extract.rod_alone", rim)
+    found = extract(photo, SCALE)
+    assert found.ok, found.reason
+    assert found.length_mm == pytest.approx(plain.length_mm, abs=0.05)
+    assert "other_rod" in found.flags
+    assert "other_rod" not in plain.flags
+
+
 def test_a_rod_that_is_found_and_not_measured_is_shown(monkeypatch):
     def refuse(*_):
         raise LostError("no_tip", "the free end of the rod shows no edge")

@@ -157,6 +157,8 @@ def _measure(photo: Photo, setting: Setting) -> Measurement:
     try:
         whole = _searched(photo, setting, sought)
     except (LostError, *BROKEN) as lost:
+        if quick is None and isinstance(doubt, _TooWideError):
+            quick = doubt.found
         if quick is not None:
             return doubted(quick)
         if isinstance(lost, LostError) and lost.seen_px:
@@ -209,7 +211,8 @@ def _measured(
     try:
         return _from_front(photo, setting, rod, view)
     except LostError as lost:
-        raise LostError(lost.flag, lost.reason, [rod.points_px]) from None
+        lost.seen_px = (rod.points_px,)
+        raise
 
 
 def _from_front(
