@@ -325,6 +325,16 @@ def test_a_thin_rim_of_a_glossy_rod_tells_its_clamp_too():
     assert np.hypot(*np.subtract(glossy.clamp_px, matt.clamp_px)) < 0.5
 
 
+@pytest.mark.parametrize("layers", [0.115, 0.13])
+def test_a_rod_is_not_followed_between_the_layers_of_a_clamp_as_dark(layers):
+    across = WIDTH * np.array([-3.5, -2.0, -1.0, 0.5, 1.5, 3.0])
+    corners = WIDTH * np.array([[-5.4, 0.0], [-0.2, 0.0], [-0.2, 0.5], [-5.4, 0.5]])
+    over = [((layers,) * 3, ROOT + corners + (0.0, y)) for y in across]
+    found = measured(rod=(0.1,) * 3, turn_deg=30.0, clamp=0.1, over=over)
+    assert np.hypot(*(found.clamp_px - ROOT)) < 1.0
+    assert found.length_mm == pytest.approx(20.0, abs=0.05)
+
+
 def test_two_rods_side_by_side_are_doubted():
     shared = np.array([0.0, 1.4 * WIDTH])
     second = strip(0.0, -0.5, 0.5) + shared

@@ -32,6 +32,11 @@ _GRID_PX = 3.0
 _UNSEEN = 8
 """Quarters of a width that a curve is carried on before two edges are seen again."""
 
+_LEAST_LIGHT = 0.2
+"""Least light of paper beside a rod, from the rod's to the level of its edges: what is
+darker is a clamp as dark as the rod, whose printed layers may lie as far apart as its
+edges do (0.09)."""
+
 _AS_LIGHT = 0.7
 """Light of paper beyond what hid an edge, over that before it; a clamp is darker."""
 
@@ -223,6 +228,7 @@ def _carry_on(
         low, high = _dark_span(grey, x, y, -v, u, beside + 2.0, sign, here)
         aside = 0.5 * (low + high)
         alike = abs(high - low - width) < 0.2 * width + 0.5
+        alike = alike and shade - dark > _LEAST_LIGHT * (level - dark)
         if alike and abs(aside) <= 0.2 * width:
             again += 1
         elif alike and abs(aside) <= 0.5 * width:
