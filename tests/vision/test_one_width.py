@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from magbend.vision.camera.calibrate import calibrate_known_length
 from magbend.vision.extraction.one_width import is_uneven
+from magbend.vision.extraction.setting import Setting
 from magbend.vision.measurement import Measurement
 
 N = 80
@@ -26,10 +28,26 @@ def rod(width):
 @pytest.mark.parametrize("towards_deg", [0.0, 60.0, 150.0])
 def test_rod_and_shade_as_one_are_wider_the_more_it_turns_from_their_shift(towards_deg):
     both = 20.0 + 12.0 * np.abs(np.sin(THETA - np.radians(towards_deg)))
-    assert is_uneven(rod(both))
+    assert is_uneven(rod(both), Setting())
 
 
 def test_an_even_rod_a_taper_and_a_little_noise_are_no_doubt():
     noise = np.random.default_rng(0).normal(0.0, 0.3, N)
-    assert not is_uneven(rod(20.0 + noise))
-    assert not is_uneven(rod(np.linspace(24.0, 14.0, N)))
+    assert not is_uneven(rod(20.0 + noise), Setting())
+    assert not is_uneven(rod(np.linspace(24.0, 14.0, N)), Setting())
+
+
+@pytest.mark.parametrize(
+    ("told", "uneven"), [(None, False), (True, False), (False, True)]
+)
+def test_a_round_rod_that_a_near_camera_sees_aslant_is_even(told, uneven):
+    near = calibrate_known_length(
+        (800, 500), from_px=(0.0, 0.0), to_px=(400.0, 0.0), length_mm=20.0,
+        camera_height_mm=20.0,
+    )  # fmt: skip
+    points = rod(20.0).points
+    axis = np.column_stack([points["x_px"], points["y_px"]])
+    is_round = Setting(calibration=near, is_round=True)
+    seen = is_round.silhouette(is_round.view(near, axis, THETA))
+    setting = Setting(calibration=near, is_round=told)
+    assert is_uneven(rod(1.0 * seen), setting) == uneven

@@ -14,7 +14,7 @@ from magbend.vision.edge.state import LostError
 from magbend.vision.extraction.extract import measure_candidate
 from magbend.vision.extraction.setting import Setting
 from magbend.vision.find.candidate import Candidate
-from magbend.vision.find.ground import View
+from magbend.vision.find.ground import View, best_view
 from magbend.vision.synthetic import signed_distance
 
 SIZE, FINE, WIDTH = (800, 500), 2, 20.0
@@ -48,7 +48,8 @@ def strip(turn_deg, low, high):
 
 
 def drawn(
-    *, rod, turn_deg, shade_px=(0, 0), deep=0.0, clamp=0.2, over=(), blur_px=1.0
+    *, rod, turn_deg, shade_px=(0, 0), deep=0.0, clamp=0.2, over=(), blur_px=1.0,
+    board=0.7,
 ):  # fmt: skip
     """Return a photograph of a rod whose shade is moved by `shade_px`.
 
@@ -60,7 +61,7 @@ def drawn(
     shade = np.maximum(
         covered(body + moved), covered(cv2.convexHull(both)[:, 0].astype(float))
     )
-    light = np.full((SIZE[1], SIZE[0], 3), 0.7) * (1.0 - deep * shade)
+    light = np.full((SIZE[1], SIZE[0], 3), board) * (1.0 - deep * shade)
     for colour, corners in ((rod, body), ((clamp,) * 3, CLAMP), *over):
         light += (np.array(colour) - light) * covered(corners)
     light = cv2.GaussianBlur(light, (0, 0), blur_px)
@@ -296,6 +297,26 @@ def test_a_streak_of_gloss_all_along_moves_no_edge(light, low, high):
     assert glossy.length_px == pytest.approx(matt.length_px, abs=0.25)
     aside = signed_distance(glossy.points_px[1:-1], matt.points_px)
     assert np.abs(aside).max() < 0.2
+
+
+def test_the_colour_that_tells_a_light_rod_may_be_cut_off():
+    def on_blue(red):
+        photo = drawn(
+            rod=(0.03, 0.4, red), turn_deg=50.0, board=(0.5, 0.25, 0.06),
+            clamp=0.03, blur_px=1.5,
+        )  # fmt: skip
+        points, _ = axis(50.0)
+        rod = Candidate(
+            points_px=points, width_px=WIDTH, length_px=400.0, root="clamp",
+            contacts=1, ratio=1.3,
+        )  # fmt: skip
+        view = best_view(photo, points, WIDTH)
+        return measure_candidate(photo, Setting(calibration=SCALE), rod, view)
+
+    whole, cut_off = on_blue(0.9), on_blue(1.2)
+    assert "clipped" in cut_off.flags
+    assert "overexposed" not in cut_off.flags
+    assert cut_off.width_px == pytest.approx(whole.width_px, abs=0.1)
 
 
 @pytest.mark.parametrize(("rod", "blur_px"), [(BLACK, 5.0), (GREEN, 7.5), (RED, 6.5)])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..curve.robust import quantile
 from ..measurement import Measurement
-from .setting import arc_mm
+from .setting import Setting, arc_mm
 
 Array = NDArray[np.float64]
 
@@ -30,19 +30,31 @@ _LEAST = 20
 """Fewest points that tell."""
 
 
-def is_uneven(result: Measurement) -> bool:
-    """Whether a rod's width varies along it as no taper does."""
+def is_uneven(result: Measurement, setting: Setting) -> bool:
+    """Whether a rod's width varies along it as no taper does.
+
+    Seen aslant, as at the border of a near picture, a flat rod and a round one widen
+    by different parts as they turn: one of untold section is even if either is.
+    """
     points = result.points
-    width = points["width_mm"]
-    if not np.isfinite(width).any():
-        width = points["width_px"]
-    s = arc_mm(np.column_stack([points["x_px"], points["y_px"]]))
-    typical = result.width_px
-    use = (points["good"] > 0.5) & np.isfinite(width)
+    axis = np.column_stack([points["x_px"], points["y_px"]])
+    seen = [np.ones(len(axis))]
+    if setting.calibration is not None:
+        x, y = np.gradient(axis, axis=0).T
+        view = setting.view(setting.calibration, axis, np.arctan2(y, x))
+        seen = setting.silhouettes(view)
+    s, typical = arc_mm(axis), result.width_px
+    use = (points["good"] > 0.5) & np.isfinite(points["width_px"])
     use &= (s > _CLEAR * typical) & (s < s[-1] - _CLEAR * typical)
     if use.sum() < _LEAST:
         return False
-    width, s, theta = width[use], s[use], points["theta_rad"][use]
+    s, theta = s[use], points["theta_rad"][use]
+    widths = [points["width_px"][use] / each[use] for each in seen]
+    return all(_varies(width, s, theta) for width in widths)
+
+
+def _varies(width: Array, s: Array, theta: Array) -> bool:
+    """Whether a width varies by more than it may, and as no taper does."""
     low, middle, high = (quantile(width, part) for part in (0.05, 0.5, 0.95))
     if high - low < UNEVEN * middle:
         return False

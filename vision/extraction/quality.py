@@ -205,7 +205,7 @@ def doubts(
         flags.append("ragged_tip")
     if _length_is_off(result, setting):
         flags.append("length_mismatch")
-    if not refined.rough and is_uneven(result):
+    if not refined.rough and is_uneven(result, setting):
         flags.append("width_uneven")
     if _side_is_off(result, setting):
         flags.append("width_mismatch")

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..curve.robust import median, quantile
+from ..edge.flank import WHITE
 from ..picture.photo import Photo
 from .binarise import WORK_PX, Binary, quadric, shrunk
 
@@ -183,7 +184,9 @@ def best_view(photo: Photo, points_px: Array, width_px: float) -> View:
     best = int(np.argmax(contrast))
     if contrast[best] < _BETTER * quantile(own.sign * (paper - grey), 0.1):
         return own
-    mix = STANDS_OUT * mixes[best] / max(median(step @ mixes[best]), 1e-6)
+    mix = mixes[best]
+    if best == 3 or median(colours[2][:, best]) < WHITE or towards[best] > 0.0:
+        mix = STANDS_OUT * mix / max(median(step @ mix), 1e-6)
     sign = -1.0 if np.all(mix <= 0.0) else 1.0
     b, g, r = (float(part) for part in sign * mix)
     return mixed(photo, (b, g, r), sign, about(points_px, width_px))
