@@ -356,6 +356,20 @@ def test_a_rod_is_not_followed_between_the_layers_of_a_clamp_as_dark(layers):
     assert found.length_mm == pytest.approx(20.0, abs=0.05)
 
 
+@pytest.mark.parametrize("shade", [0.7, 0.35, 0.25])
+def test_a_tip_that_is_blurred_into_its_shade_is_doubted(shade):
+    """Without a calibration nothing tells such a shade from the rod's end face."""
+    points, theta = axis(30.0)
+    along = np.array([np.cos(theta[-1]), np.sin(theta[-1])])
+    side = 0.5 * WIDTH * np.array([-along[1], along[0]])
+    near, far = points[-1], points[-1] + 6.0 * along
+    beyond = np.array([near - side, near + side, far + side, far - side])
+    photo = drawn(
+        rod=(0.05,) * 3, turn_deg=30.0, over=[((shade,) * 3, beyond)], blur_px=2.0
+    )
+    assert ("ragged_tip" in extract(photo, None).flags) == (shade < 0.7)
+
+
 def test_two_rods_side_by_side_are_doubted():
     shared = np.array([0.0, 1.4 * WIDTH])
     second = strip(0.0, -0.5, 0.5) + shared

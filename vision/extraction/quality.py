@@ -70,10 +70,10 @@ OFF_FRONT = 0.15
 """How far from the front that is seen beside it a rod may begin, in widths: two of
 three are nearer."""
 
-UNRESOLVED, SMEARED = 0.21, 0.075
+UNRESOLVED, SMEARED, TIP_SMEARED = 0.21, 0.075, 0.15
 """Blur, in widths, above which a clamp's front and its shade are seen as one line where
 shade pulls: an edge then takes half the rod's width to rise. Or by which that line is
-more blurred than the rod and its tip."""
+more blurred than the rod and its tip; or a tip's, more than the rod."""
 
 
 def refusal(
@@ -201,7 +201,7 @@ def doubts(
     unsure = refined.good.mean() < 0.8 or refined.fit.noise > 0.02 * result.width_px
     if refined.rough or unsure:
         flags.append("rough_edges")
-    if refined.tip.scatter > 0.5 or abs(refined.tip.skew) > 0.2:
+    if _is_no_face(refined):
         flags.append("ragged_tip")
     if _length_is_off(result, setting):
         flags.append("length_mismatch")
@@ -233,6 +233,17 @@ def _is_off_front(refined: Refined, candidate: Candidate) -> bool:
     root, _ = refined.fit.curve.at(np.zeros(1))
     away = np.hypot(*(root[0] - candidate.points_px[0]))
     return bool(away > OFF_FRONT * refined.typical_width + APART_PX)
+
+
+def _is_no_face(refined: Refined) -> bool:
+    """Whether a tip is no flat face: frayed, or its shade is blurred into one with it.
+
+    Such an end rises more slowly than the rod's sides do.
+    """
+    tip = refined.tip
+    slower = math.sqrt(max(tip.blur**2 - refined.blur**2, 0.0))
+    soft = slower > TIP_SMEARED * refined.typical_width
+    return tip.scatter > 0.5 or abs(tip.skew) > 0.2 or soft
 
 
 def _lines_differ(refined: Refined) -> bool:
