@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -11,8 +12,9 @@ import pytest
 from magbend.vision import as_photo, extract
 from magbend.vision.camera.calibration import scale_calibration
 from magbend.vision.curve.curve import Curve
-from magbend.vision.edge.clamp import DARKEST
-from magbend.vision.extraction.quality import _goes_on, doubts
+from magbend.vision.edge.clamp import DARKEST, ClampLines
+from magbend.vision.edge.crossings import EndFace
+from magbend.vision.extraction.quality import _front_in_shade, _goes_on, doubts
 from magbend.vision.extraction.refine import refine
 from magbend.vision.extraction.setting import Setting
 from magbend.vision.extraction.strip import along_rod
@@ -111,3 +113,14 @@ def test_rod_far_out_of_focus_is_as_wide_as_in_focus(blur_px):
     assert found.width_px == pytest.approx(20.0, rel=0.1)
     assert found.blur_px == pytest.approx(blur_px, rel=0.2)
     assert "blurred" in found.flags
+
+
+@pytest.mark.parametrize("rise", [0.0, 0.4])
+def test_a_front_that_no_step_fits_is_doubted(rise):
+    """One was 3 px off, and the direction with it by 2.6 degrees, without a doubt."""
+    front = EndFace(s=0.0, sigma=1.8, skew=0.0, scatter=1.5, found=0.8, rise=rise)
+    refined = SimpleNamespace(
+        clamp=ClampLines(face=None, front=front), typical_width=30.0, blur=1.0,
+        tip=SimpleNamespace(blur=1.0),
+    )  # fmt: skip
+    assert _front_in_shade(refined, 0.0) == (rise == 0.0)

@@ -215,10 +215,12 @@ def doubts(
 
 
 def _front_in_shade(refined: Refined, pull: float) -> bool:
-    """Whether a clamp's front and its shade may be blurred into one line."""
+    """Whether a clamp's front and its shade may be one line, or no step fits it."""
     if refined.clamp is None:
         return False
-    width = refined.typical_width
+    front, width = refined.clamp.front, refined.typical_width
+    if front is not None and front.rise == 0.0:
+        return True
     smeared = smeared_px(refined, refined.clamp.blur) > SMEARED * width
     return smeared or (pull > SHADE_PX and refined.blur > UNRESOLVED * width)
 
