@@ -12,7 +12,7 @@ from numba.core import sigutils
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.types import BooleanLiteral, IntegerLiteral
 
-from .linked import linked
+from .linked import has_code, linked
 
 
 def spare(compiled: Any) -> None:
@@ -36,14 +36,14 @@ def spare(compiled: Any) -> None:
         ):
             compile_(signature)
             result = compiled.overloads[kinds]
-            if is_for_python and not result.library.is_emitted:
+            if is_for_python and not has_code(result.library):
                 result = _emitted(compiled, result)
                 add_overload(result)
                 compiled._cache.save_overload(signature, result)
         return result.entry_point
 
     def add(result: Any) -> None:
-        if result.library.is_emitted:
+        if has_code(result.library):
             add_overload(result)
         else:  # nothing that could be called yet
             compiled.overloads[tuple(result.signature.args)] = result

@@ -13,8 +13,12 @@ from contextlib import contextmanager
 from typing import Any
 
 import llvmlite.binding as llvm
+from numba import version_info
 from numba.core.codegen import JITCodeLibrary
 from numba.core.environment import lookup_environment
+
+TRIED = {(0, 68)}
+"""Versions of numba whose privates are known here; by others, all is machine code."""
 
 _WRAPPER = "_ZN7cpython"
 """How the names of functions begin through which Python calls a kernel."""
@@ -93,7 +97,7 @@ class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
 
 @contextmanager
 def linked(compiled: Any) -> Iterator[bool]:
-    """Compile for other kernels; tell whether Python asks a dispatcher for it.
+    """Compile for other kernels; tell whether it is Python that asks for it.
 
     Parameters
     ----------
@@ -102,8 +106,15 @@ def linked(compiled: Any) -> Iterator[bool]:
     """
     compiled.targetctx.refresh()  # numba's own library of memory is to be emitted
     codegen = compiled.targetctx.codegen()
-    before, codegen._library_class = codegen._library_class, LinkedLibrary
+    before = codegen._library_class
+    if version_info.short in TRIED:
+        codegen._library_class = LinkedLibrary
     try:
-        yield before is not LinkedLibrary
+        yield codegen._library_class is not before
     finally:
         codegen._library_class = before
+
+
+def has_code(library: Any) -> bool:
+    """Whether a code library is machine code, and not only linked into others."""
+    return not isinstance(library, LinkedLibrary) or library.is_emitted
