@@ -19,7 +19,7 @@ from magbend.vision.synthetic import signed_distance
 
 SIZE, FINE, WIDTH = (800, 500), 2, 20.0
 BLACK, RED, GREEN = (0.025,) * 3, (0.05, 0.04, 0.45), (0.06, 0.25, 0.05)
-TAN = (0.26, 0.43, 0.58)
+TAN, ORANGE, BLUE = (0.26, 0.43, 0.58), (0.03, 0.4, 0.9), (0.5, 0.25, 0.06)
 ROOT = np.array([200.0, 240.0])
 CLAMP = ROOT + np.array([[0, 90], [0, -90], [-110, -90], [-110, 90]])
 SCALE = calibrate_known_length(
@@ -134,13 +134,17 @@ def test_a_colour_tells_a_rod_from_a_shade_that_is_as_dark_or_darker(rod):
     assert found.length_mm == pytest.approx(20.0, abs=0.06)
 
 
-@pytest.mark.parametrize("rod", [RED, GREEN])
-def test_a_rod_is_as_wide_in_any_colour(rod):
-    """Grey values made before the light was linear: 0.3 px off where colours mix."""
-    black, coloured = (
-        measured(rod=each, turn_deg=30.0, blur_px=1.5).width_px for each in (BLACK, rod)
+@pytest.mark.parametrize(
+    "coloured",
+    [{"rod": RED}, {"rod": GREEN}, {"rod": ORANGE, "board": BLUE, "clamp": 0.03}],
+)
+def test_a_rod_is_as_wide_in_any_colour(coloured):
+    """Grey values made before the light was linear: 0.3 to 1.2 px off in such blurs."""
+    black, other = (
+        measured(**each, turn_deg=30.0, blur_px=1.5).width_px
+        for each in ({"rod": BLACK}, coloured)
     )
-    assert coloured == pytest.approx(black, abs=0.06)
+    assert other == pytest.approx(black, abs=0.06)
 
 
 def test_it_tells_a_clamps_front_from_a_shade_that_blur_makes_one_with_it():
@@ -302,7 +306,7 @@ def test_a_streak_of_gloss_all_along_moves_no_edge(light, low, high):
 def test_the_colour_that_tells_a_light_rod_may_be_cut_off():
     def on_blue(red):
         photo = drawn(
-            rod=(0.03, 0.4, red), turn_deg=50.0, board=(0.5, 0.25, 0.06),
+            rod=(0.03, 0.4, red), turn_deg=50.0, board=BLUE,
             clamp=0.03, blur_px=1.5,
         )  # fmt: skip
         points, _ = axis(50.0)

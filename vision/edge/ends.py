@@ -47,11 +47,12 @@ def find_ends(
     end = seen.good & (seen.s > curve.s[-1] - 1.5 * width)
     taper = median(edges.width[end]) if end.sum() > 3 else width
     face = None if walls is None else _face_seen(state, walls)
-    for far in (reach, 1.3 * width):  # the end of a taper may lie farther on
+    blur = state.tip_blur or state.blur
+    # The end of a taper may lie farther on, and be sharper than it seemed.
+    for far, soft in ((reach, blur), (1.3 * width, blur), (1.3 * width, state.blur)):
         tip = find_tip(
             grey, curve, expected=state.last + outwards, width=min(width, taper),
-            blur=state.tip_blur or state.blur, reach=far, middle=middle, face=face,
-            sign=sign, fine=fine,
+            blur=soft, reach=far, middle=middle, face=face, sign=sign, fine=fine,
         )  # fmt: skip
         if tip is not None:
             break

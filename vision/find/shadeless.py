@@ -117,11 +117,14 @@ def in_its_colour(photo: Photo, rod: Candidate, view: View) -> tuple[Candidate, 
     if band is None:
         return rod, view
     within = float(np.mean(np.abs(band.middle) < 0.5 * band.width)) > _ALL_ALONG
-    if not within and not _is_its_shade(band):
+    is_light = median(band.share[band.tint > 0.8]) > _LIGHT
+    if not within and (is_light or not _is_its_shade(band)):
         return rod, view
     whole = within and _AS_WIDE < band.width / rod.width_px < 1.0 / _AS_WIDE
-    if whole and _is_pale(band):
+    if whole and (is_light or _is_pale(band)):
         return rod, in_lightness(photo, rod, view)
+    if is_light:
+        return rod, view
     mix = _discriminant(band)
     if np.std(band.light[band.tint > 0.8] @ mix) > _UNEVEN:
         return rod, view
@@ -274,8 +277,7 @@ def _tinted(share: Array) -> Array:
     most = float(np.quantile(away, 0.97))
     noise = 0.7 * median(np.abs(np.diff(hue, axis=0)).max(axis=2).ravel())
     strong = away > 0.6 * most
-    light = median(brightness[strong].ravel())
-    if most < max(_COLOURED, _CLEAR * noise) or light > _LIGHT:
+    if most < max(_COLOURED, _CLEAR * noise):
         return np.zeros(away.shape)
     direction = np.median(hue[strong], axis=0)
     direction /= np.linalg.norm(direction)
