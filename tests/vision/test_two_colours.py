@@ -10,6 +10,7 @@ from magbend.vision import as_photo, extract
 from magbend.vision.synthetic import signed_distance
 
 WHITE, BLACK, TAN = (0.75, 0.75, 0.75), (0.03, 0.03, 0.03), (0.30, 0.55, 0.75)
+RED, GREY = (0.02, 0.02, 0.36), (0.46, 0.46, 0.47)
 PAPER, CLAMP = (0.42, 0.35, 0.30), (0.03, 0.10, 0.25)
 WIDTH, FINE = 18, 4
 
@@ -20,10 +21,10 @@ def arc(length=420.0, turn_deg=60.0):
     return np.array([220.0, 130.0]) + np.cumsum(steps, axis=0)
 
 
-def drawn(*colours, clamp=CLAMP):
+def drawn(*colours, clamp=CLAMP, paper=PAPER):
     """Return a photograph of a rod of parts, as long each, in a clamp."""
     light = np.empty((500 * FINE, 800 * FINE, 3), np.float32)
-    light[:] = PAPER
+    light[:] = paper
     axis = arc()
     theta = np.arctan2(*np.gradient(axis, axis=0).T[::-1])
     side = 0.5 * WIDTH * np.column_stack([-np.sin(theta), np.cos(theta)])
@@ -55,3 +56,11 @@ def test_both_parts_are_measured_as_one_rod(colours):
     assert np.sqrt(np.mean(np.square(away))) < 0.3
     assert np.hypot(*(np.array(found.tip_px) - truth[-1])) < 1.5
     assert found.width_px == pytest.approx(WIDTH, abs=1.0)
+
+
+@pytest.mark.parametrize("first", [BLACK, RED], ids=["black", "red"])
+def test_a_white_half_beyond_a_dark_one_is_not_lost_on_grey_paper(first):
+    """Lighter than paper, it is no shade, though a mix of colours may not see it."""
+    found = extract(drawn(first, WHITE, paper=GREY, clamp=(0.1, 0.1, 0.1)), None)
+    assert found.ok, found.reason
+    assert np.hypot(*(np.array(found.tip_px) - arc()[-1])) < 1.5

@@ -44,6 +44,20 @@ def better(quick: Measurement, whole: Measurement) -> Measurement:
     )
 
 
+def is_whole(found: Measurement, part: Measurement | None) -> bool:
+    """Whether nothing goes on beyond a tip; and it is more of a part, if there is one.
+
+    The part and the whole leave the clamp at one place.
+    """
+    if TIP_GOES_ON in found.flags:
+        return False
+    if part is None:
+        return True
+    aside = np.hypot(*np.subtract(found.clamp_px, part.clamp_px))
+    longer = found.length_px > part.length_px + part.width_px
+    return bool(longer and aside < 0.5 * part.width_px and _same(part, found))
+
+
 def _same(one: Measurement, other: Measurement) -> bool:
     """Whether two measurements are of one rod: the middle of one lies on the other."""
     middle = len(one.points["x_px"]) // 2

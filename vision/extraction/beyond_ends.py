@@ -193,8 +193,8 @@ def _sides(strip: Strip, refined: Refined) -> Array:
 def tip_goes_on(photo: Photo, strip: Strip, refined: Refined) -> bool:
     """Whether something as wide as the rod goes on beyond its tip.
 
-    Then it may be the rod, paler or in another colour; a shade has softer edges, and
-    darkens all colours alike.
+    Then it may be the rod, paler, in another colour, or on the other side of the
+    paper's light; a shade has softer edges, and darkens all colours alike.
     """
     width, end = refined.typical_width, refined.fit.curve.s[-1]
     beside = 0.5 + 4.0 / width
@@ -202,7 +202,8 @@ def tip_goes_on(photo: Photo, strip: Strip, refined: Refined) -> bool:
     near, far = max(0.4 * width, 4.0), 1.2 * width + 4.0
     before = across[:, strip.between(end - far, end - near)]
     paler = PALER_TIP * (median(before[::4].ravel()) - median(before[1:4].ravel()))
-    if _step_aside(across[:, strip.between(end + near, end + far)]) > paler:
+    beyond = across[:, strip.between(end + near, end + far)]
+    if max(_step_aside(beyond), _step_aside(-beyond)) > paler:
         return True
     return _sharp_edge(strip, end) > paler or _tinted(photo, refined)
 
@@ -232,7 +233,11 @@ def _sharp_edge(strip: Strip, end: float) -> float:
 
 
 def _tinted(photo: Photo, refined: Refined) -> bool:
-    """Whether something in another colour, as wide as the rod, goes on beyond a tip."""
+    """Whether something in another colour, as wide as the rod, goes on beyond a tip.
+
+    Or lighter in each colour than what lies beside it: a white part is no shade, and
+    looks like the paper where shade does.
+    """
     curve, width = refined.fit.curve, refined.typical_width
     half = round(2.0 * width) + 12
     x, y = (max(round(float(part)) - half, 0) for part in curve.points[-1])
@@ -248,6 +253,8 @@ def _tinted(photo: Photo, refined: Refined) -> bool:
         lanes(np.ascontiguousarray(each), near, s, across)
         for each in np.moveaxis(light, 2, 0)
     )
+    if _step_aside(-np.minimum(np.minimum(blue, green), red)) > TINTED_TIP:
+        return True
     return any(
         _step_aside(sign * (one - other)) > TINTED_TIP
         for one, other in ((blue, green), (green, red), (red, blue))

@@ -28,7 +28,7 @@ from ..find.track import Start, start_curve
 from ..measurement import Measurement, Pose, failure
 from ..picture.photo import Photo
 from .bare import flattened
-from .believed import apart_from_colour, better, doubted, is_sure
+from .believed import apart_from_colour, better, doubted, is_sure, is_whole
 from .crossing import crossings
 from .quality import (
     AROUND,
@@ -170,22 +170,31 @@ def _measure(photo: Photo, setting: Setting) -> Measurement:
 def _searched(photo: Photo, setting: Setting, sought: Sought) -> Measurement:
     """Measure the likeliest of what all levels show that can be measured.
 
+    Of one that goes on beyond its tip, the next that is all of it.
+
     Raises
     ------
     LostError
         Of the first thing that is like a rod.
     """
     first = LostError("no_rod", "nothing in the picture is long and thin like a rod")
+    part = None
     try:
         for rod in likely_rods(photo, sought):
             try:
-                return _seen(photo, setting, *seen_best(photo, sought, rod))
+                found = _seen(photo, setting, *seen_best(photo, sought, rod))
             except LostError as lost:
                 lost.seen_px = (rod.points_px,)
                 first = first if first.seen_px else lost
+                continue
+            if is_whole(found, part):
+                return found
+            part = part or found
     except LostError as several:
         first = first if first.seen_px else several
-    raise first
+    if part is None:
+        raise first
+    return part
 
 
 def _seen(photo: Photo, setting: Setting, rod: Candidate, view: View) -> Measurement:
