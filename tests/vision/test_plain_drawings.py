@@ -447,6 +447,26 @@ def test_plain_light_is_not_believed_where_colour_shows_the_rod_elsewhere(monkey
     assert not found.ok
 
 
+@pytest.mark.parametrize("aside", [0.0, 0.8])
+def test_edges_farther_aside_are_not_believed_where_colour_shows_the_rod_elsewhere(
+    monkeypatch, aside
+):
+    """A rod too thin to be measured by its colour had its shade given for it."""
+
+    def wide_alone(photo, setting, rod, view):
+        if rod.width_px < 1.5 * WIDTH:
+            raise LostError("edges_lost", "there are none")
+        return plain
+
+    plain = measured(rod=RED, turn_deg=30.0)
+    colour_shows(monkeypatch, blind, 0.0, aside)
+    monkeypatch.setattr(
+        "magbend.vision.extraction.extract.measure_candidate", wide_alone
+    )
+    found = extract(drawn(rod=RED, turn_deg=30.0), SCALE, rod_height_mm=0.0)
+    assert found.ok == (aside == 0.0)
+
+
 @pytest.mark.parametrize(("shade_px", "alone"), [((-17, 3), True), ((-16, 6), False)])
 def test_a_front_that_shade_beside_the_root_leaves_unchecked_is_in_doubt(
     shade_px, alone

@@ -16,6 +16,10 @@ PALE = 0.3
 """Light of a rod, over the paper's, above which it may be a shade, or a face of
 something: all levels and colours are then looked at."""
 
+AS_LONG, AS_LONG_PX = 0.05, 1.0
+"""By how much the lengths of a rod between the same ends may differ in two lights, in
+widths and px."""
+
 
 def is_sure(quick: Measurement, rod: Candidate, view: View) -> bool:
     """Whether one level of lightness may have shown the whole rod, and no shade.
@@ -35,13 +39,20 @@ def doubted(quick: Measurement) -> Measurement:
 
 
 def better(quick: Measurement, whole: Measurement) -> Measurement:
-    """Return the one of two measurements that is longer, or held by a clamp."""
+    """Return the one of two measurements that is longer, or held by a clamp.
+
+    Of two with the same ends it is that with fewer flags.
+    """
     if "clamp_at_border" in quick.flags:
         held = not {"clamp_at_border", "no_clamp", "rough_edges"} & set(whole.flags)
         return whole if held else quick
-    return (
-        quick if _same(quick, whole) and quick.length_px >= whole.length_px else whole
-    )
+    if not _same(quick, whole):
+        return whole
+    longer, shorter = sorted((quick, whole), key=lambda one: -one.length_px)
+    apart = longer.length_px - shorter.length_px
+    same_ends = apart < AS_LONG * longer.width_px + AS_LONG_PX
+    fewer = len(shorter.flags) < len(longer.flags)
+    return shorter if same_ends and fewer else longer
 
 
 def is_whole(found: Measurement, part: Measurement | None) -> bool:

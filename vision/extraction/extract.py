@@ -147,7 +147,7 @@ def _measure(photo: Photo, setting: Setting) -> Measurement:
     quick, doubt = None, LostError("no_rod", "nothing stands out from the background")
     try:
         rod, view = find_rod(photo, sought)
-        quick = _measured(photo, setting, rod, view)
+        quick = _from_front(photo, setting, rod, view)
         if is_sure(quick, rod, view) and not shows_another(photo, rod):
             return quick
     except LostError as lost:
@@ -208,29 +208,27 @@ def _seen(photo: Photo, setting: Setting, rod: Candidate, view: View) -> Measure
             raise
         wide = replace(rod, width_px=ASIDE * rod.width_px)
         try:
-            return doubted(measure_candidate(photo, setting, wide, view))
+            found = doubted(measure_candidate(photo, setting, wide, view))
         except LostError:
             raise lost from None
-
-
-def _measured(
-    photo: Photo, setting: Setting, rod: Candidate, view: View
-) -> Measurement:
-    """Measure what was found; a refusal shows it."""
-    try:
-        return _from_front(photo, setting, rod, view)
-    except LostError as lost:
-        lost.seen_px = (rod.points_px,)
-        raise
+        told, seen = in_its_colour(photo, rod, view)
+        by_colour = seen is not view and not seen.plain
+        if by_colour and apart_from_colour(found, told) > ELSEWHERE:
+            raise
+        return found
 
 
 def _from_front(
     photo: Photo, setting: Setting, rod: Candidate, view: View
 ) -> Measurement:
-    """Measure a rod, from the front that all colours show if its own light does not."""
+    """Measure a rod, from the front that all colours show if its own light does not.
+
+    A refusal shows it.
+    """
     try:
         return measure_candidate(photo, setting, rod, view)
     except LostError as lost:
+        lost.seen_px = (rod.points_px,)
         told = lost.flag != "no_clamp" or rod.from_front
         whole = None if told else held(photo, rod)
         with suppress(LostError):
