@@ -8,7 +8,9 @@ import pytest
 
 from magbend.vision import as_photo, extract
 from magbend.vision.find.candidate import Candidate
+from magbend.vision.find.choose import find_rod
 from magbend.vision.find.held import held, seen_behind
+from magbend.vision.find.sought import Sought
 
 PAPER, WHITE, BLACK = (0.35, 0.35, 0.35), (0.75, 0.75, 0.75), (0.03, 0.03, 0.03)
 BLUE, PALE = (0.6, 0.3, 0.15), (0.7, 0.65, 0.75)
@@ -22,8 +24,8 @@ def axis_of(length=420.0):
     return ROOT + np.cumsum(steps, axis=0)
 
 
-def scene(*, rod, clamp=None, tip_clamp=None, shade=1.0, shade_px=0, seed=3):
-    """Return a photograph of a rod: what holds it, and the clamp's shade over it."""
+def scene(*, rod, clamp=None, tip_clamp=None, shade=1.0, shade_px=0, dim=(), seed=3):
+    """Return a photograph of a rod: what holds it, the clamp's shade, and others."""
     light = np.empty((500, 800, 3), np.float32)
     light[:] = PAPER
     axis = axis_of()
@@ -43,6 +45,8 @@ def scene(*, rod, clamp=None, tip_clamp=None, shade=1.0, shade_px=0, seed=3):
         light[:, : edge + shade_px] *= shade
     if clamp is not None:
         light[80:240, 40:edge] = clamp
+    for left, top, right, bottom in dim:
+        light[top:bottom, left:right] *= 0.7
     light = cv2.GaussianBlur(light, (0, 0), 1.0)
     light += np.random.default_rng(seed).normal(0.0, 0.003, light.shape)
     code = 255.0 * (1.055 * np.clip(light, 0.004, 1.0) ** (1 / 2.4) - 0.055)
@@ -124,3 +128,15 @@ def test_a_rod_is_seen_behind_what_lies_across_it_and_not_within_its_clamp(bar, 
         photo = as_photo(light)
         axis = axis[axis[:, 0] > 310.0]
     assert seen_behind(photo, axis[::4], WIDTH) is seen
+
+
+def test_a_rod_is_not_forgotten_for_what_only_pale_levels_show():
+    """Two shades with a thin edge each are seen where the rod's own joins it."""
+    shades = [(600, 20, 660, 80), (660, 46, 760, 52)]
+    shades += [
+        (left, top + 400, right, bottom + 400) for left, top, right, bottom in shades
+    ]
+    photo, axis = scene(rod=BLACK, clamp=WHITE, dim=[(175, 90, 580, 450), *shades])
+    rod, _ = find_rod(photo, Sought())
+    assert rod.from_front
+    assert rod.away(axis[200]) < 3.0

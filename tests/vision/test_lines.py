@@ -105,3 +105,13 @@ def test_a_rod_is_found_on_what_lies_beside_a_larger_sheet():
     best = found[int(np.argmin(away))]
     assert best.length_px == pytest.approx(380.0, rel=0.08)
     assert best.root == "clamp"
+
+
+def test_what_is_short_is_not_tried_before_a_rod_on_another_ground():
+    photo, axis = mat(rod=SKY, line=PALE)
+    sheet = np.full((500, 1100, 3), 235, np.uint8)
+    sheet[200:300, 500:600] = sheet[245:255, 600:720] = 20
+    found = list(likely_rods(as_photo(np.hstack([photo.decode(), sheet])), Sought()))
+    is_stub = [rod.points_px[0, 0] > 800.0 for rod in found]
+    is_rod = [rod.away(axis[100]) < 6.0 for rod in found]
+    assert is_rod.index(True) < is_stub.index(True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -34,6 +34,8 @@ Array = NDArray[np.float64]
 
 _DARK = 0.25
 """Light of a rod, over the paper's, that no mix of colours tells much better."""
+
+_Finder = Callable[[Photo, Sought, Binary], Iterator[Candidate]]
 
 _GROUNDS = 3
 """Grounds that things are told from, one after the other."""
@@ -75,7 +77,8 @@ def likely_rods(photo: Photo, sought: Sought) -> Iterator[Candidate]:
     """Yield what may be the rod as all levels of lightness and colour together show it.
 
     Each is for the case that those before it could not be measured, and then has them
-    as rivals. On squared paper things are looked for without its lines first.
+    as rivals. On squared paper things are looked for without its lines first; and what
+    is short last of all.
 
     Parameters
     ----------
@@ -90,22 +93,36 @@ def likely_rods(photo: Photo, sought: Sought) -> Iterator[Candidate]:
         If another one is as likely, with the axes of what was seen.
     """
     several, seen = None, False
-    for ground in _grounds(photo):
-        unlined = without_lines(ground)
-        for picture in (ground,) if unlined is None else (unlined, ground):
-            if seen and unlined is not None:
-                picture = beyond_lines(ground, unlined)  # a line is no rod either
-            try:
-                for rod in _in_picture(photo, sought, picture):
-                    if rod.root == "clamp" or not seen:
-                        yield replace(rod, rivalled=rod.rivalled or seen)
-                    seen = True
-            except LostError as lost:
-                if lost.flag == "two_rods":
-                    raise
-                several = several or lost
+    for find, ground, unlined in _looks(photo):
+        picture = ground
+        if seen and unlined is not None:
+            picture = beyond_lines(ground, unlined)  # a line is no rod either
+        try:
+            for rod in find(photo, sought, picture):
+                if rod.root == "clamp" or not seen:
+                    yield replace(rod, rivalled=rod.rivalled or seen)
+                seen = True
+        except LostError as lost:
+            if lost.flag == "two_rods":
+                raise
+            several = several or lost
     if several is not None:
         raise several
+
+
+def _looks(photo: Photo) -> Iterator[tuple[_Finder, Binary, Binary | None]]:
+    """Yield what looks for rods, and where: a ground, and that without its lines."""
+    seen: list[tuple[Binary, Binary | None]] = []
+    for ground in _grounds(photo):
+        unlined = without_lines(ground)
+        pictures = [(ground, unlined)]
+        if unlined is not None:
+            pictures.insert(0, (unlined, None))
+        for picture in pictures:
+            yield _in_picture, *picture
+        seen += pictures
+    for picture in seen:
+        yield _short, *picture
 
 
 def _grounds(photo: Photo) -> Iterator[Binary]:
@@ -133,8 +150,14 @@ def _in_picture(photo: Photo, sought: Sought, binary: Binary) -> Iterator[Candid
                 yield other.best
         if rod.root == "clamp" and rod.contacts == 1:
             return
-    # What leads through the picture is a cable; and what is short may be held.
-    held = _held(things) or _held(_things(photo, sought, binary, LEVELS, LEAST_HELD))
+    held = _held(things)  # what leads through the picture is a cable
+    if held:
+        yield standing_out(_without_shades(photo, held), sought)
+
+
+def _short(photo: Photo, sought: Sought, binary: Binary) -> Iterator[Candidate]:
+    """Yield what is short in one picture, and which a clamp holds."""
+    held = _held(_things(photo, sought, binary, LEVELS, LEAST_HELD))
     if held:
         yield standing_out(_without_shades(photo, held), sought)
 
@@ -217,6 +240,9 @@ def _choose(photo: Photo, binary: Binary, sought: Sought) -> Candidate:
             continue
         rod = _likeliest(rods)
         rod = min([rod, *alike(rod, rods)], key=sought.misfit)
+        # What shows only where less is dark may be the clamp's shade: seek its root.
+        if best is not None and not best.lies_on(rod):
+            continue
         others = [
             other
             for other in alike(rod, rods)
@@ -225,9 +251,7 @@ def _choose(photo: Photo, binary: Binary, sought: Sought) -> Candidate:
         if others:
             raise too_many([rod, *others], sought)
         rod = replace(rod, halved=any(are_halves(rod, other) for other in rods))
-        # What shows only where less is dark may be the clamp's shade: seek its root.
-        same = best is None or best.lies_on(rod)
-        if rod.root != "free" and same:
+        if rod.root != "free":
             return _accept(rod)
         best = best or rod
     if best is None:
