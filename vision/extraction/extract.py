@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
@@ -13,9 +12,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import MagbendError
 from ..camera.calibration import Calibration
-from ..camera.find_tag import TaggedClamp, tagged_clamp
 from ..camera.oriented import oriented
-from ..curve.curve import Curve
 from ..edge.state import LostError
 from ..find.candidate import Candidate
 from ..find.choose import find_rod, likely_rods, seen_best
@@ -25,7 +22,7 @@ from ..find.held import held
 from ..find.shadeless import in_its_colour, in_lightness
 from ..find.sought import Sought
 from ..find.track import Start, start_curve
-from ..measurement import Measurement, Pose, failure
+from ..measurement import Measurement, failure
 from ..picture.photo import Photo
 from .bare import flattened
 from .believed import apart_from_colour, better, doubted, is_sure, is_whole
@@ -42,6 +39,7 @@ from .setting import Setting
 from .specimen_frame import measurement
 from .streak import is_parted, whole_rod
 from .strip import Strip, along_candidate, along_rod, blur_of
+from .told_clamp import seen_tag
 from .two_levels import rod_alone
 
 Array = NDArray[np.float64]
@@ -378,9 +376,9 @@ def finish(
 
 def _in_mm(photo: Photo, view: View, refined: Refined, setting: Setting) -> Measurement:
     """Return the measurement of a refined rod, without a word of doubt."""
-    told = _told(photo, setting, refined.fit.curve)
+    tag = seen_tag(photo, setting, refined.fit.curve)
     return replace(
-        measurement(refined, view, setting, told), inverted=view.sign < 0.0,
+        measurement(refined, view, setting, tag), inverted=view.sign < 0.0,
         mix=view.mix, joints_px=refined.joints,
     )  # fmt: skip
 
@@ -410,18 +408,6 @@ def _refined(
             "lens, or soften the light on a glossy rod",
         )
     return refined
-
-
-def _told(photo: Photo, setting: Setting, curve: Curve) -> TaggedClamp | None:
-    """Return what a tag on the clamp tells, where there is one."""
-    camera = setting.calibration
-    if camera is None or camera.clamp_tag is None:
-        return None
-    root, ahead = camera.to_mm(curve.points[:2], height_mm=setting.axis_height_mm)
-    x, y = ahead - root
-    heading = math.degrees(math.atan2(y, x))
-    rod = Pose(x_mm=float(root[0]), y_mm=float(root[1]), angle_deg=heading)
-    return tagged_clamp(photo.grey, camera, rod)
 
 
 def _start(grey: Image, candidate: Candidate, sign: float, blur: float = 1.0) -> Start:

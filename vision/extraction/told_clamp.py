@@ -13,7 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..camera.calibration import Calibration
-from ..camera.find_tag import TaggedClamp
+from ..camera.find_tag import TaggedClamp, tagged_clamp
+from ..curve.curve import Curve
+from ..measurement import Pose
+from ..picture.photo import Photo
 from .refine import Refined
 from .root import RootPlace
 from .setting import Setting
@@ -42,6 +45,28 @@ class ToldClamp:
     angle_deg: float = math.nan
     angle_sd_deg: float = math.inf
     flags: tuple[str, ...] = ()
+
+
+def seen_tag(photo: Photo, setting: Setting, curve: Curve) -> TaggedClamp | None:
+    """Return what a tag on the clamp tells, where there is one.
+
+    Parameters
+    ----------
+    photo : Photo
+        The photograph.
+    setting : Setting
+        What is known: a camera that knows the tag, or else there is none.
+    curve : Curve
+        The rod's axis, px, from the clamp on.
+    """
+    camera = setting.calibration
+    if camera is None or camera.clamp_tag is None:
+        return None
+    root, ahead = camera.to_mm(curve.points[:2], height_mm=setting.axis_height_mm)
+    x, y = ahead - root
+    heading = math.degrees(math.atan2(y, x))
+    rod = Pose(x_mm=float(root[0]), y_mm=float(root[1]), angle_deg=heading)
+    return tagged_clamp(photo.grey, camera, rod)
 
 
 def told_clamp(
