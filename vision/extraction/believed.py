@@ -24,11 +24,12 @@ widths and px."""
 def is_sure(quick: Measurement, rod: Candidate, view: View) -> bool:
     """Whether one level of lightness may have shown the whole rod, and no shade.
 
-    What was measured by a colour of its own all along is none.
+    What was measured by a colour of its own all along is none; what no clamp holds in
+    its own light may be a part of a rod.
     """
     doubts = {TIP_GOES_ON, OTHER_COLOUR, "clamp_at_border"} & set(quick.flags)
     coloured = quick.mix not in (None, LUMINANCE, view.mix)
-    return not doubts and (coloured or rod.ratio < PALE)
+    return not doubts and not rod.from_front and (coloured or rod.ratio < PALE)
 
 
 def doubted(quick: Measurement) -> Measurement:
