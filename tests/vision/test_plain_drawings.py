@@ -192,6 +192,20 @@ def test_a_paler_half_beside_its_darker_shade_is_not_lost_without_a_word():
     assert "tip_goes_on" not in measured(**light).flags
 
 
+def test_a_red_rod_in_a_jpeg_is_no_wider_than_it_is_beside_its_deep_shade():
+    """JPEG keeps every other pixel's colour, which alone tells the rod from shade."""
+    photo = drawn(
+        rod=(0.016, 0.013, 0.155), turn_deg=30.0, shade_px=(-14, -36), deep=0.7
+    )
+    colour = np.asarray(photo.decode())
+    half = [cv2.IMWRITE_JPEG_QUALITY, 90, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, 0x221111]
+    _, data = cv2.imencode(".jpg", colour, half)
+    found = extract(as_photo(cv2.imdecode(data, cv2.IMREAD_COLOR)), SCALE)
+    assert found.ok, found.reason
+    assert found.width_px == pytest.approx(WIDTH, rel=0.03)
+    assert np.hypot(*(np.array(found.tip_px) - axis(30.0)[0][-1])) < 0.6
+
+
 def bar(at, angle_deg, length, width):
     """Return the corners of a bar about a point."""
     t = np.radians(angle_deg)

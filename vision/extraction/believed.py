@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import cv2
 import numpy as np
 
 from ..curve.robust import median
 from ..find.candidate import Candidate
 from ..find.ground import LUMINANCE, View
 from ..measurement import Measurement
+from ..picture.photo import Photo
 from .quality import OTHER_COLOUR, OTHER_ROD, TIP_GOES_ON
 
 PALE = 0.3
@@ -19,6 +21,10 @@ something: all levels and colours are then looked at."""
 AS_LONG, AS_LONG_PX = 0.05, 1.0
 """By how much the lengths of a rod between the same ends may differ in two lights, in
 widths and px."""
+
+_OUT, _BEYOND = 0.62, 2.0
+"""Light at a side, from the rod's to that beyond it, by so many blurs, which is half at
+an edge and less in a shade: more is the paper's."""
 
 
 def is_sure(quick: Measurement, rod: Candidate, view: View) -> bool:
@@ -95,3 +101,25 @@ def apart_from_colour(plain: Measurement, rod: Candidate) -> float:
     aside = median(np.sum((inner - axis[nearest]) * across, axis=1))
     wider = 0.5 * (plain.width_px - rod.width_px)
     return (abs(aside) + abs(wider)) / rod.width_px
+
+
+def lies_out(photo: Photo, found: Measurement) -> bool:
+    """Whether the sides that colour tells lie out on the paper, by their lightness.
+
+    JPEG keeps every other pixel's colour, half of it of the paper where edges are.
+    """
+    points, good = found.points, found.points["good"] > 0.5
+    axis = found.points_px[good]
+    level = []
+    for side in ("left", "right"):
+        edge = np.column_stack([points[f"{side}_x_px"], points[f"{side}_y_px"]])[good]
+        out = edge - axis
+        out *= _BEYOND * found.blur_px / np.hypot(*out.T)[:, None]
+        places = np.stack([axis, edge, edge + out], axis=1).astype(np.float32)
+        x, y = cv2.split(places)
+        light = cv2.remap(
+            photo.grey, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
+        )  # fmt: skip
+        rod, at, beyond = light.T
+        level.append(median((at - rod) / np.maximum(beyond - rod, 1e-3)))
+    return max(level) > _OUT

@@ -25,7 +25,14 @@ from ..find.track import Start, start_curve
 from ..measurement import Measurement, failure
 from ..picture.photo import Photo
 from .bare import flattened
-from .believed import apart_from_colour, better, doubted, is_sure, is_whole
+from .believed import (
+    apart_from_colour,
+    better,
+    doubted,
+    is_sure,
+    is_whole,
+    lies_out,
+)
 from .crossing import crossings
 from .quality import (
     AROUND,
@@ -265,7 +272,7 @@ def measure_candidate(
         lost = error
     # What makes a rod rough in a mix of colours may be the mix's noise.
     if found is not None and (seen.plain or "rough_edges" not in found.flags):
-        return found
+        return found if seen.plain else _sharper(photo, setting, rod, found)
     try:
         plain = _measured_in(
             photo, setting, candidate, view, strip, far, glossy=parted
@@ -280,6 +287,23 @@ def measure_candidate(
     if lost is not None and apart > ELSEWHERE:
         raise lost
     return plain if apart < AS_COLOURED else doubted(plain)
+
+
+def _sharper(
+    photo: Photo, setting: Setting, rod: Candidate, found: Measurement
+) -> Measurement:
+    """Measure a rod in its lightness, where its colour shows it, if that is coarse."""
+    if not lies_out(photo, found):
+        return found
+    rod = replace(rod, points_px=found.points_px, width_px=found.width_px)
+    view = in_lightness(photo, rod, View(grey=photo.grey, sign=1.0))
+    strip = along_candidate(view, rod)
+    with suppress(LostError, *BROKEN):
+        sharp = _measured_in(photo, setting, rod, view, strip, None, glossy=False)
+        no_worse = set(sharp.flags) <= set(found.flags)
+        if no_worse and apart_from_colour(sharp, rod) < AS_COLOURED:
+            return sharp
+    return found
 
 
 def _measured_in(
