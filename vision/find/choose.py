@@ -78,7 +78,7 @@ def likely_rods(photo: Photo, sought: Sought) -> Iterator[Candidate]:
 
     Each is for the case that those before it could not be measured, and then has them
     as rivals. On squared paper things are looked for without its lines first; and what
-    is short last of all.
+    is short last of all, if there are not several that are long.
 
     Parameters
     ----------
@@ -94,6 +94,8 @@ def likely_rods(photo: Photo, sought: Sought) -> Iterator[Candidate]:
     """
     several, seen = None, False
     for find, ground, unlined in _looks(photo):
+        if find is _short and several is not None:
+            break
         picture = ground
         if seen and unlined is not None:
             picture = beyond_lines(ground, unlined)  # a line is no rod either
