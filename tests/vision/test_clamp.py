@@ -97,14 +97,12 @@ def test_what_moved_along_the_rod_is_not_held_to_the_blur_of_its_sides():
     assert lines.face.s == pytest.approx(-5.0, abs=0.1)
 
 
-@pytest.mark.parametrize("radius", [150.0, -150.0])
-def test_a_front_askew_to_a_bent_rod_is_met_where_its_axis_meets_it(radius):
-    """Lanes beside a bent rod are no parallels: the straight line is none on them."""
-    slope = 0.15
+def front_of_bent(radius: float, slope: float, width: float, expected: float = 0.0):
+    """Return the front of a clamp which a rod leaves at (60, 110) on an arc."""
     x, y = np.meshgrid(np.arange(260.0), np.arange(220.0))
     into = 1.0 / (1.0 + np.exp((x - 60.0 - slope * (y - 110.0)) / 0.6))
     away = np.abs(np.hypot(x - 60.0, y - 110.0 - radius) - abs(radius))
-    paper = PAPER + (ROD - PAPER) / (1.0 + np.exp((away - 8.0) / 0.6))
+    paper = PAPER + (ROD - PAPER) / (1.0 + np.exp((away - 0.5 * width) / 0.6))
     light = (paper + (TOP - paper) * into).astype(np.float32)
     s = np.linspace(0.0, 120.0, 121)
     theta = s / radius
@@ -112,13 +110,28 @@ def test_a_front_askew_to_a_bent_rod_is_met_where_its_axis_meets_it(radius):
         [60.0 + radius * np.sin(theta), 110.0 + radius * (1.0 - np.cos(theta))]
     )
     curve = Curve(s=s, points=points, theta=theta, kappa=np.full(121, 1.0 / radius))
-    front = find_clamp(
-        light, curve, expected=0.0, width=16.0, blur=1.0, contrast=PAPER - ROD,
+    return find_clamp(
+        light, curve, expected=expected, width=width, blur=1.0, contrast=PAPER - ROD,
         reach=10.0,
     ).front  # fmt: skip
+
+
+@pytest.mark.parametrize("radius", [150.0, -150.0])
+def test_a_front_askew_to_a_bent_rod_is_met_where_its_axis_meets_it(radius):
+    """Lanes beside a bent rod are no parallels: the straight line is none on them."""
+    front = front_of_bent(radius, 0.15, 16.0)
     assert front is not None
     assert front.s == pytest.approx(0.0, abs=0.05)
-    assert front.skew == pytest.approx(slope, abs=5e-3)
+    assert front.skew == pytest.approx(0.15, abs=5e-3)
+
+
+@pytest.mark.parametrize("radius", [56.0, -56.0])
+def test_lanes_that_meet_inside_a_bend_do_not_turn_the_front(radius):
+    slope = -0.05 * np.sign(radius)
+    front = front_of_bent(radius, slope, 28.0, expected=1.0)
+    assert front is not None
+    assert front.s == pytest.approx(0.0, abs=0.3)
+    assert front.skew == pytest.approx(slope, abs=0.01)
 
 
 @pytest.mark.parametrize(("slope", "seen"), [(0.2, True), (0.7, False)])

@@ -25,8 +25,11 @@ AXIS = Curve(
 )  # fmt: skip
 
 
-def photograph(*, ground, rod, clamp, shaded_px=0.0):
-    """Return a straight rod in a clamp, its first `shaded_px` in hard shade."""
+def photograph(*, ground, rod, clamp, shaded_px=0.0, top=None):
+    """Return a straight rod in a clamp, its first `shaded_px` in hard shade.
+
+    The clamp may have another colour at its top, behind a chamfer 14 px long.
+    """
     y, x = np.mgrid[:HEIGHT, :WIDE].astype(float)
     light = np.ones((HEIGHT, WIDE, 3)) * ground
     body = np.clip(0.5 * WIDTH + 0.5 - np.abs(y - Y), 0.0, 1.0)
@@ -35,6 +38,9 @@ def photograph(*, ground, rod, clamp, shaded_px=0.0):
     light *= 1.0 - 0.75 * np.clip(ROOT + shaded_px - x + 0.5, 0.0, 1.0)[..., None]
     held = np.clip(ROOT - x + 0.5, 0.0, 1.0) * (np.abs(y - Y) < 110.0) * (x > 30.0)
     light += (np.array(clamp) - light) * held[..., None]
+    if top is not None:
+        held *= np.clip(ROOT - 14.0 - x + 0.5, 0.0, 1.0)
+        light += (np.array(top) - light) * held[..., None]
     light = cv2.GaussianBlur(light, (0, 0), 1.0)
     light += np.random.default_rng(5).normal(0.0, 0.003, light.shape)
     pixels = 255.0 * (1.055 * np.clip(light, 0.004, 1.0) ** (1 / 2.4) - 0.055)
@@ -79,3 +85,13 @@ def test_a_clamp_is_found_far_behind_the_root_of_a_rough_curve():
     found = refine(photo.grey, start, root="clamp", sign=1.0, photo=photo)
     begin, _ = found.fit.curve.at(np.zeros(1))
     assert begin[0] == pytest.approx((ROOT, Y), abs=0.3)
+
+
+def test_a_rod_as_light_as_a_chamfer_does_not_end_at_its_upper_edge():
+    """Grey light shows no end of the rod, and the upper edge is the steepest one."""
+    orange, lilac, white = (0.02, 0.2, 0.4), (0.6, 0.2, 0.25), (0.95, 0.95, 0.95)
+    photo = photograph(ground=BOARD, rod=orange, clamp=lilac, top=white)
+    start = Start(curve=AXIS, width=WIDTH, rough=False, blur=1.0)
+    found = refine(photo.grey, start, root="clamp", sign=-1.0, photo=photo)
+    begin, _ = found.fit.curve.at(np.zeros(1))
+    assert begin[0] == pytest.approx((ROOT, Y), abs=0.5)

@@ -29,7 +29,7 @@ Image = NDArray[np.float32]
 
 _LANES = np.linspace(-0.5, 0.5, 9)
 _BESIDE = np.linspace(0.5, 2.0, 13)
-_FACE_SEEN, _FRONT_SEEN = 0.6, 3.0
+FACE_SEEN, _FRONT_SEEN = 0.6, 3.0
 """Widths of the rod over which the two lines are seen."""
 _SHADED = 0.03
 """Light times px by which shade and grain move a line seen over one width of a rod,
@@ -54,6 +54,9 @@ _PARALLEL, _ASKEW = 0.3, 0.45
 """Slopes by which the two lines, both in one plane, may differ, and a line may be off a
 right angle, a camera aslant and a root hidden behind a bend allowed for: else it is no
 end that is seen on the rod, as where a lamp from one side lights but half of it."""
+
+_SQUEEZED = 0.7
+"""Part of its length that a lane inside a bend has lost where it tells nothing more."""
 
 _LEAST_PX = 0.8
 """Blur for which a lane's own levels are sought at least: fewer samples do not tell."""
@@ -91,19 +94,27 @@ class ClampLines:
 
 def between(first: float, second: float, lines: ClampLines) -> float:
     """Return the place by the least squares of those that each of two lines tells."""
-    a, b = _sureness(lines.face, _FACE_SEEN), _sureness(lines.front, _FRONT_SEEN)
+    a, b = _sureness(lines.face, FACE_SEEN), _sureness(lines.front, _FRONT_SEEN)
     return (a * first + b * second) / (a + b) if a + b > 0.0 else 0.5 * (first + second)
 
 
 def _sureness(line: EndFace | None, seen: float) -> float:
-    """Return the inverse of the variance of a line that is seen over so many widths.
-
-    What shade and grain do alike to neighbouring lanes does not show in their scatter;
-    it goes with the inverse of the step's height.
-    """
+    """Return the inverse of the variance of a line that is seen over so many widths."""
     if line is None or line.rise <= 0.0:
         return 0.0
-    return 1.0 / (line.place_sd**2 + (_SHADED / line.rise) ** 2 / seen)
+    return 1.0 / doubt_px(line, seen) ** 2
+
+
+def doubt_px(line: EndFace | None, seen: float = FACE_SEEN) -> float:
+    """Return the deviation of a line that is seen over so many widths, px.
+
+    What shade and grain do alike to neighbouring lanes does not show in their scatter;
+    it goes with the inverse of the step's height. Infinite where there is no line.
+    """
+    if line is None:
+        return math.inf
+    alike = _SHADED / line.rise / math.sqrt(seen) if line.rise > 0.0 else 0.0
+    return math.hypot(line.place_sd, alike)
 
 
 def find_clamp(
@@ -167,7 +178,16 @@ def find_clamp(
 
 
 def _square(face: EndFace | None, front: EndFace | None) -> ClampLines:
-    """Return the lines without those that no clamp has which a rod leaves squarely."""
+    """Return the lines without those that no clamp has which a rod leaves squarely.
+
+    Nor has one a line that no step fits, where the other shows what its step is.
+    """
+    if (
+        face is not None
+        and front is not None
+        and (face.rise > 0.0) != (front.rise > 0.0)
+    ):
+        face, front = (face, None) if face.rise > 0.0 else (None, front)
     if front is not None and abs(front.skew) > _ASKEW:
         front = None
     along, most = (0.0, _ASKEW) if front is None else (front.skew, _PARALLEL)
@@ -196,7 +216,7 @@ def _face(
 ) -> Crossed:  # fmt: skip
     """Return lanes on the rod, out of the clamp's end: their s falls into the clamp."""
     s = -np.arange(expected - span, expected + span, STEP_PX)[::-1]
-    across = _FACE_SEEN * _LANES * width
+    across = FACE_SEEN * _LANES * width
     light = lanes_along(grey, curve, -s, across, sign)
     place = _steepest(light, s, -expected, reach, 0.12 * contrast)
     if not np.isnan(place):
@@ -215,8 +235,11 @@ def _front(
     s = np.arange(expected - span, expected + span, STEP_PX)
     beside = beside + near + 3.0
     across = np.concatenate((-beside[::-1], beside))
+    # The normals of a bent rod meet: near there no lane runs beside another.
+    bend = np.interp(expected, curve.s, curve.kappa)
+    across = across[bend * across < _SQUEEZED]
     light = lanes_along(grey, curve, s, across, sign)
-    count = beside.size
+    count = np.sum(across < 0.0)
     sides = light[:count], light[count:]
     left, right = [_steepest(x, s, expected, reach, 0.15 * contrast) for x in sides]
     crossing = np.concatenate((
@@ -226,8 +249,7 @@ def _front(
     # A side on which nothing rises does not count as one whose lanes do not cross.
     first = count if np.isnan(left) else 0
     last = count if np.isnan(right) else across.size
-    # The normals of a bent rod meet: along it, a straight line askew rises so far.
-    bend = np.interp(expected, curve.s, curve.kappa)
+    # Along a bent rod, a straight line askew rises so far.
     crossed: Crossed = line_through(
         light[first:last], s, (across / (1.0 - bend * across))[first:last],
         crossing[first:last],

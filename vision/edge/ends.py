@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 
 from ..curve.curve import Curve
 from ..curve.robust import median
-from .clamp import DARKEST, DIMMED, ClampLines, between, find_clamp, goes_on_at
+from .clamp import (
+    DARKEST,
+    DIMMED,
+    ClampLines,
+    between,
+    doubt_px,
+    find_clamp,
+    goes_on_at,
+)
 from .clamp_light import STEP, clamp_light
 from .crossings import EndFace
 from .edges import clear_of
@@ -23,6 +31,9 @@ Image = NDArray[np.float32]
 
 APART_PX = 2.0
 """The two lines at a clamp tell different things if they are farther apart."""
+
+_SURE_PX = 0.5
+"""Deviation of where the rod is seen to end above which its own light is asked."""
 
 _LEAST_SHADE, _SEEN_ON, _SHADED, _LAG_PX = 0.25, 0.7, 0.5, 1.5
 """Widths of the rod by which a line is ahead of the root, and share of the stations
@@ -73,9 +84,9 @@ def find_ends(
         lines = _clamp_lines(grey, state, seen, sign, fine=fine)
     if rough:
         lines = _nearer(lines, _in_own_light(state, fine=fine), state)
-    elif lines.face is None and lines.front is None:
-        lines = _in_own_light(state, fine=fine)
-    elif state.plain is not None:
+    elif not (lines.face and doubt_px(lines.face) < _SURE_PX):
+        lines = _with_own(lines, state, fine=fine)
+    if not rough and state.clamp_light is None and state.plain is not None:
         lines = _with_front(lines, state.plain, state, seen, fine=fine)
     state.clamp_blur = lines.blur
     return tip, lines, _first(lines, state.face_px)
@@ -136,6 +147,37 @@ def _in_own_light(state: State, *, fine: bool) -> ClampLines:
         )  # fmt: skip
 
     return ClampLines(face=seen_in(light.rod).face, front=seen_in(light.paper).front)
+
+
+def _with_own(lines: ClampLines, state: State, *, fine: bool) -> ClampLines:
+    """Return lines where the rod is not clearly seen to end, or its own light's.
+
+    A front alone may be the upper edge of a chamfer, or the border of a shade; what no
+    step fits is no end.
+    """
+    none = lines.face is None and lines.front is None
+    if not (fine or none):
+        return lines
+    own = _in_own_light(state, fine=fine)
+    if none:
+        return own
+    state.clamp_light = None
+    steps = [line for line in (lines.face, lines.front) if line and line.rise > 0.0]
+    if not steps and _doubt_px(own) < _doubt_px(lines):
+        return own
+    if own.face is None or own.face.rise == 0.0:
+        return lines
+    front = lines.front
+    if front and not front.bulge and own.face.s < front.s - APART_PX:
+        return lines  # what ends behind a straight front may be of the clamp
+    return ClampLines(
+        face=min(lines.face, own.face, key=doubt_px),
+        front=min(lines.front, own.front, key=doubt_px),
+    )
+
+
+def _doubt_px(lines: ClampLines) -> float:
+    return min(doubt_px(lines.face), doubt_px(lines.front))
 
 
 def _nearer(plain: ClampLines, own: ClampLines, state: State) -> ClampLines:

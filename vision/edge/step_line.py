@@ -103,9 +103,10 @@ def _fitted(
     )
     if not (abs(place - line.s) < 2.0 * wide and np.any(known != 0.0)):
         # No step fits here: what was crossed may be anything as blurred as this.
+        skew_sd = line.skew_sd * wide / line.sigma
         unsure = EndFace(
-            line.s, wide, line.skew, line.scatter, line.found, 0.0, 0.0, line.skew_sd,
-            0.0, 0.0,
+            line.s, wide, line.skew, line.scatter, line.found, 0.0, 0.0, skew_sd, 0.0,
+            0.0,
         )  # fmt: skip
         return unsure, 0.0
     share = known / np.sum(known)
