@@ -52,7 +52,7 @@ def _run(out: Path, *, seed: int, tell: Tell) -> Path:
         write_templates(out, twin=True)
     plan = read_plan(out / "plan.toml")
     if not is_warm():
-        tell("kernels  compiling the numerical kernels, once; a minute or two")
+        tell("kernels  compiling the numerical kernels, once; a few minutes")
         warm_up()
     folder = _free_name(out)
     gaps = ", ".join(f"{gap_mm:g}" for gap_mm in plan.gaps_mm)

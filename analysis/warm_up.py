@@ -91,7 +91,7 @@ def _photograph() -> None:
 def main(tell: Callable[[str], object] = sys.stderr.write) -> None:
     """Compile what is not compiled yet."""
     if not is_warm():
-        tell("compiling the numerical kernels (once, a minute or two)\n")
+        tell("compiling the numerical kernels (once, a few minutes)\n")
         warm_up()
 
 

@@ -14,6 +14,7 @@ import os
 import threading
 import warnings
 from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from contextvars import ContextVar
 from pathlib import Path
 from types import CodeType
@@ -69,21 +70,17 @@ class Kernel:
     def _compile(self) -> Any:
         from numba import njit as numba_njit
 
-        from .compiling import spare
-
-        options = self._options
         try:
-            compiled = numba_njit(**options)(self._function)
+            compiled = numba_njit(**self._options)(self._function)
         except RuntimeError as error:
             if "no locator available" not in str(error):
                 raise
             # Neither beside the source nor in the home can anything be written.
-            options = {**options, "cache": False}
-            compiled = numba_njit(**options)(self._function)
-        if options.get("cache"):
+            return numba_njit(**{**self._options, "cache": False})(self._function)
+        if self._options.get("cache"):
             file = compiled._cache._cache_file
             file._source_stamp = (file._source_stamp, self.fingerprint)
-        spare(compiled)
+            compiled.compile = _one_at_a_time(compiled)
         return compiled
 
     @functools.cached_property
@@ -165,6 +162,28 @@ class Kernel:
         except (ArithmeticError, ValueError):
             # 1 / 0 and sqrt(-1) are numbers to machine code.
             raise _Unfit from None
+
+
+def _one_at_a_time(compiled: Any) -> Callable[[Any], Any]:
+    """Return a dispatcher's `compile` that lets one process compile what others load.
+
+    Processes that start together would each compile the same, and write over what the
+    others noted in the kernel's index.
+    """
+    from numba.core.compiler_lock import global_compiler_lock
+
+    compile_, file = compiled.compile, f"{compiled._cache._cache_file._index_path}.lock"
+
+    def compile_in_turn(signature: Any) -> Any:
+        with global_compiler_lock, ExitStack() as held:
+            if not compiled._compiling_counter:
+                with suppress(ImportError, OSError):  # a system or disk without locks
+                    from fcntl import LOCK_EX, flock
+
+                    flock(held.enter_context(Path(file).open("w")), LOCK_EX)
+            return compile_(signature)
+
+    return compile_in_turn
 
 
 def _codes(code: CodeType) -> list[CodeType]:

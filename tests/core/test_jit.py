@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import gc
-import importlib
 import math
 import pickle
 import subprocess
@@ -15,11 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numba import version_info
 
 from magbend.core import jit
-from magbend.core.jit import Kernel, njit, once
-from magbend.core.linked import TRIED, has_code
+from magbend.core.jit import njit, once
 
 
 @njit()
@@ -212,56 +208,3 @@ def test_a_kernel_that_was_only_looked_at_is_not_at_hand(
     assert not kernel.is_at_hand  # else the next call would wait for the compiler
     assert kernel(1.0) == 2.0
     assert kernel.is_at_hand
-
-
-@njit()
-def scaled(x, power, twice):
-    return x**power * (2.0 if twice else 1.0)
-
-
-@njit()
-def sum_of_scaled(x, n):
-    total = scaled(x, 2, True) + scaled(x, 1, False)
-    for power in range(n):
-        total += scaled(x, power, power > 1)
-    return total
-
-
-def test_numbers_written_in_a_call_make_no_version_of_a_kernel() -> None:
-    assert sum_of_scaled(3.0, 3) == 18.0 + 3.0 + (1.0 + 3.0 + 18.0)
-    assert len(scaled.compiled.signatures) == 1
-
-
-@pytest.mark.skipif(version_info.short not in TRIED, reason="numba was not tried")
-def test_what_is_only_linked_has_no_machine_code_until_python_calls_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "linked_inner.py").write_text(INNER.format(factor=2.0))
-    text = OUTER.partition("stored")[0].replace("from inner", "from linked_inner")
-    (tmp_path / "linked_outer.py").write_text(text)
-    monkeypatch.syspath_prepend(tmp_path)
-    outer = importlib.import_module("linked_outer").outer
-    inner = importlib.import_module("linked_inner").inner
-
-    def codes(kernel: Kernel) -> list[bool]:
-        return [has_code(each.library) for each in kernel.compiled.overloads.values()]
-
-    assert outer(1.0) == 3.0
-    assert (codes(outer), codes(inner)) == ([True], [False])
-    (stored,) = (tmp_path / "__pycache__").glob("linked_inner.inner*.nbc")
-    bitcode = stored.read_bytes()
-    for _ in range(2):  # from bitcode, then from the machine code kept of it
-        again = Kernel(inner._function, inner._options)
-        assert again(4.0) == 8.0
-        assert codes(again) == [True]
-        assert not again.compiled.stats.cache_misses
-    assert b"ELF" not in bitcode
-    assert stored.read_bytes() != bitcode
-    assert inner(4.0) == 8.0
-    assert codes(inner) == [True]
-
-
-def test_the_collector_of_garbage_rests_only_while_kernels_are_compiled() -> None:
-    kernel = Kernel(lambda x: x + 1.0, {})
-    assert kernel(1.0) == 2.0
-    assert gc.isenabled()
