@@ -98,3 +98,13 @@ def beside(points: Array, theta: Array, offset: Array) -> Array:
         out[i, 0] = points[i, 0] - offset[i] * np.sin(theta[i])
         out[i, 1] = points[i, 1] + offset[i] * np.cos(theta[i])
     return out
+
+
+def arc_lengths(points: Array) -> Array:
+    """Return the arc length at the points (n, 2) of a polyline."""
+    return np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
+
+
+def on_polyline(along: Array, s: Array, points: Array) -> Array:
+    """Return points (k, 2) of a polyline at arc lengths; `s` are those of its own."""
+    return np.column_stack([np.interp(along, s, axis) for axis in points.T])

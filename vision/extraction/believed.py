@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import cv2
 import numpy as np
 
 from ..curve.robust import median
@@ -12,6 +11,7 @@ from ..find.candidate import Candidate
 from ..find.ground import LUMINANCE, View
 from ..measurement import Measurement
 from ..picture.photo import Photo
+from ..picture.sample import bilinear
 from .quality import OTHER_COLOUR, OTHER_ROD, TIP_GOES_ON
 
 PALE = 0.3
@@ -115,11 +115,7 @@ def lies_out(photo: Photo, found: Measurement) -> bool:
         edge = np.column_stack([points[f"{side}_x_px"], points[f"{side}_y_px"]])[good]
         out = edge - axis
         out *= _BEYOND * found.blur_px / np.hypot(*out.T)[:, None]
-        places = np.stack([axis, edge, edge + out], axis=1).astype(np.float32)
-        x, y = cv2.split(places)
-        light = cv2.remap(
-            photo.grey, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE
-        )  # fmt: skip
-        rod, at, beyond = light.T
+        places = np.stack([axis, edge, edge + out], axis=1)
+        rod, at, beyond = bilinear(photo.grey, places).T
         level.append(median((at - rod) / np.maximum(beyond - rod, 1e-3)))
     return max(level) > _OUT

@@ -391,8 +391,8 @@ def finish(
             candidate = replace(candidate, hidden_px=hidden)
             refined = _refined(photo, view, start, candidate, setting, sd_px, joints)
             strip, result = along_rod(view, refined), None
-        refusal(photo, view, strip, refined, candidate)
-        around = doubts_around(photo, view, strip, refined, candidate, setting)
+        around = refusal(photo, view, strip, refined, candidate)
+        around |= doubts_around(photo, view, strip, refined, candidate, setting)
     if result is None:
         result = _in_mm(photo, view, refined, setting)
     return doubts(result, photo, around, refined, candidate, setting)

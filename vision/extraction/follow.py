@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import MagbendError
 from ..camera.oriented import oriented
-from ..curve.curve import Curve
+from ..curve.curve import Curve, arc_lengths
 from ..edge.state import LostError, Root
 from ..find.candidate import Candidate
 from ..find.ground import View, mixed
@@ -27,7 +27,7 @@ from .bare import flattened
 from .extract import BROKEN, finish, measure
 from .motion import begun, expected, moved_on
 from .quality import is_as_before
-from .setting import Setting, arc_mm
+from .setting import Setting
 
 Array = NDArray[np.float64]
 
@@ -131,7 +131,7 @@ def _near(photo: Photo, setting: Setting, last: Measurement) -> Measurement | No
 
 def _expected(rod: Candidate) -> Start:
     """Return a start right where the rod is expected."""
-    s = arc_mm(rod.points_px)
+    s = arc_lengths(rod.points_px)
     even = np.linspace(0.0, s[-1], len(s))
     points = np.column_stack([np.interp(even, s, axis) for axis in rod.points_px.T])
     step = np.gradient(points, axis=0)

@@ -23,6 +23,7 @@ from ..find.candidate import Candidate
 from ..find.ground import best_view
 from ..measurement import Measurement, failure
 from ..picture.photo import Photo
+from ..picture.sample import nearest_pixels
 from ..picture.turn import turned_points
 from .extract import BROKEN, measure_candidate
 from .setting import Setting
@@ -195,7 +196,7 @@ def _path(grey: NDArray[np.float32], points: Array) -> Array:
         cv2.resize(grey, size, interpolation=cv2.INTER_AREA), dtype=np.float32
     )
     # Of the way along the points against that beside them: dark rod or light.
-    straight = _sampled(small, points / factor)
+    straight = nearest_pixels(small, points / factor).astype(np.float64)
     is_light = float(np.median(straight)) > float(np.median(small)) * 1.2
     cost = _cost(small, lighter=is_light)
     ways = [
@@ -205,11 +206,6 @@ def _path(grey: NDArray[np.float32], points: Array) -> Array:
     way = np.concatenate([ways[0], *(part[1:] for part in ways[1:])]) * factor
     way[0], way[-1] = points[0], points[-1]
     return _smoothed(way)
-
-
-def _sampled(image: NDArray[np.float32], points: Array) -> Array:
-    at = np.clip(np.rint(points).astype(int), 0, np.array(image.shape)[::-1] - 1)
-    return np.asarray(image[at[:, 1], at[:, 0]], dtype=np.float64)
 
 
 def _cost(small: NDArray[np.float32], *, lighter: bool) -> Array:

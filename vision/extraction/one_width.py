@@ -10,9 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..curve.curve import arc_lengths
 from ..curve.robust import quantile
 from ..measurement import Measurement
-from .setting import Setting, arc_mm
+from .setting import Setting
 
 Array = NDArray[np.float64]
 
@@ -43,7 +44,7 @@ def is_uneven(result: Measurement, setting: Setting) -> bool:
         x, y = np.gradient(axis, axis=0).T
         view = setting.view(setting.calibration, axis, np.arctan2(y, x))
         seen = setting.silhouettes(view)
-    s, typical = arc_mm(axis), result.width_px
+    s, typical = arc_lengths(axis), result.width_px
     use = (points["good"] > 0.5) & np.isfinite(points["width_px"])
     use &= (s > _CLEAR * typical) & (s < s[-1] - _CLEAR * typical)
     if use.sum() < _LEAST:

@@ -22,6 +22,7 @@ from ...core.errors import VisionError
 from ..camera.calibration import Calibration
 from ..measurement import Pose
 from ..picture.photo import Photo
+from ..picture.sample import bilinear
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -289,9 +290,7 @@ def _lowest(offsets: Array, left: Array) -> Array:
 def _profiles(grey: Image, seen: Seen, steps: Array) -> Array:
     """Return the light along each point's normal, shape (n, steps)."""
     where = seen.at[:, None] + steps[None, :, None] * seen.along[:, None]
-    x, y = (np.ascontiguousarray(where[..., k], np.float32) for k in (0, 1))
-    light = cv2.remap(grey, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(light, dtype=np.float64)
+    return bilinear(grey, where)
 
 
 def _moved(

@@ -20,12 +20,7 @@ from ..find.ground import View
 from ..find.rod_colour import ALIKE, distance_from
 from ..measurement import Measurement
 from ..picture.photo import Photo
-from .beyond_ends import (
-    check_ends,
-    goes_on_after_gap,
-    goes_on_behind,
-    tip_goes_on,
-)
+from .beyond_ends import check_ends, goes_on_after_gap, tip_goes_on
 from .crossing import over_paper
 from .deviations import scale_sd
 from .one_width import is_uneven
@@ -78,8 +73,13 @@ more blurred than the rod and its tip; or a tip's, more than the rod."""
 
 def refusal(
     photo: Photo, view: View, strip: Strip, refined: Refined, candidate: Candidate
-) -> None:
+) -> set[str]:
     """Refuse a refined rod that contradicts what was found at first.
+
+    Returns
+    -------
+    set of str
+        The doubt that is left of what it is not refused for.
 
     Raises
     ------
@@ -108,9 +108,10 @@ def refusal(
             "inconsistent",
             "the axis runs over bare paper for a while: two things may cross there",
         )
-    check_ends(photo, view, strip, refined, root=candidate.root)
+    behind = check_ends(photo, view, strip, refined, root=candidate.root)
     if length < 5.0 * width:
         raise LostError("no_rod", "what looks like a rod is shorter than five widths")
+    return {CLAMP_DOUBTFUL} if behind else set()
 
 
 def doubts_around(
@@ -124,10 +125,7 @@ def doubts_around(
         found.add(OTHER_ROD)
     face_px = setting.face_px(refined.fit.curve)
     darkest = DARKEST if view.plain else DIMMED
-    behind = refined.clamp is not None and not refined.rough and goes_on_behind(strip)
-    if behind or (
-        candidate.root == "clamp" and _goes_on(strip, refined, face_px, darkest)
-    ):
+    if candidate.root == "clamp" and _goes_on(strip, refined, face_px, darkest):
         found.add(CLAMP_DOUBTFUL)
     if not refined.rough and tip_goes_on(photo, strip, refined):
         found.add(TIP_GOES_ON)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ...core.specimen import Specimen
 from ..camera.calibration import Calibration
 from ..camera.projection import LocalView, local_view
-from ..curve.curve import Curve
+from ..curve.curve import Curve, arc_lengths
 from ..find.sought import Clamp, Sought
 from ..picture.photo import Photo
 
@@ -125,7 +125,7 @@ class Setting:
             scale = curve.s[-1] / self.length_mm
             return [scale * joint for joint in self.joints_mm]
         points = self.calibration.to_mm(curve.points, height_mm=self.axis_height_mm)
-        s_mm = arc_mm(points)
+        s_mm = arc_lengths(points)
         return [float(np.interp(joint, s_mm, curve.s)) for joint in self.joints_mm]
 
     def walls_px(
@@ -196,8 +196,3 @@ def with_specimen(setting: Setting, specimen: Specimen) -> Setting:
         height_share=section.height_mm / section.width_mm,
         colour=setting.colour or specimen.colour,
     )
-
-
-def arc_mm(points: Array) -> Array:
-    """Return the arc length at the points of a polyline."""
-    return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])

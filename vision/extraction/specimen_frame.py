@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ..camera.calibration import Calibration
 from ..camera.find_tag import TaggedClamp
-from ..curve.curve import normals_of
+from ..curve.curve import arc_lengths, normals_of
 from ..curve.robust import median
 from ..edge.state import LostError
 from ..edge.tip import ROUND_END
@@ -28,7 +28,7 @@ from .clamp_fit import ClampFit, fit_clamp
 from .deviations import faces_px, is_dark, with_deviations
 from .refine import Refined
 from .root import root_place
-from .setting import Setting, arc_mm
+from .setting import Setting
 from .told_clamp import told_clamp
 
 Array = NDArray[np.float64]
@@ -117,7 +117,7 @@ def _calibrated(
     clamp = fit_clamp(told, refined, seen_in, setting, camera)
     s = np.linspace(clamp.s, last, 4 * POINTS)
     points, _ = curve.at(s)
-    s_mm = arc_mm(camera.to_mm(points, height_mm=setting.axis_height_mm))
+    s_mm = arc_lengths(camera.to_mm(points, height_mm=setting.axis_height_mm))
     if not np.isfinite(s_mm[-1]):
         raise LostError(
             "calibration_mismatch",

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..curve.curve import arc_lengths, on_polyline
 from ..edge.state import Root
 
 Array = NDArray[np.float64]
@@ -93,8 +94,7 @@ class Candidate:
     def from_tip(self, along: Array) -> Array:
         """Return points at distances from its tip along it, px, shape (n, 2)."""
         points = self.points_px[::-1]
-        s = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
-        return np.column_stack([np.interp(along, s, axis) for axis in points.T])
+        return on_polyline(along, arc_lengths(points), points)
 
     def lies_on(self, other: Candidate) -> bool:
         """Whether its middle lies on another: a part of it, or the same thing."""

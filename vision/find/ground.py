@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..curve.robust import median, quantile
 from ..edge.flank import WHITE
 from ..picture.photo import Photo
+from ..picture.sample import nearest_pixels
 from .binarise import WORK_PX, Binary, quadric, shrunk
 
 Array = NDArray[np.float64]
@@ -170,8 +171,10 @@ def best_view(photo: Photo, points_px: Array, width_px: float) -> View:
         Its width.
     """
     rod, left, right = beside(points_px, width_px, photo.grey.shape)
-    grey = _sampled(photo.grey, rod)
-    paper = 0.5 * (_sampled(photo.grey, left) + _sampled(photo.grey, right))
+    grey = nearest_pixels(photo.grey, rod).astype(np.float64)
+    paper = nearest_pixels(photo.grey, np.stack([left, right])).mean(
+        axis=0, dtype=np.float64
+    )
     own = View(grey=photo.grey, sign=1.0 if median(paper - grey) > 0.0 else -1.0)
     colours = photo.colour_at(np.stack([left, right, rod]))
     if colours is None:
@@ -279,8 +282,3 @@ def beside(
     limit = np.array([shape[1] - 1, shape[0] - 1])
     low, middle, high = (np.clip(spot, 0, limit) for spot in spots)
     return low, middle, high
-
-
-def _sampled(light: Image, points: Array) -> Array:
-    x, y = np.rint(points).astype(int).T
-    return np.asarray(light[y, x], np.float64)

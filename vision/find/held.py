@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..curve.curve import arc_lengths, on_polyline
 from ..edge.state import LostError
 from ..picture.photo import Photo
 from .candidate import Candidate
@@ -110,7 +111,7 @@ def held(photo: Photo, rod: Candidate) -> Candidate | None:
     if len(found) != 1:
         return None
     return replace(
-        rod, points_px=found[0], length_px=float(_lengths(found[0])[-1]),
+        rod, points_px=found[0], length_px=float(arc_lengths(found[0])[-1]),
         root="clamp", contacts=1, leaves=False, from_front=True,
     )  # fmt: skip
 
@@ -132,13 +133,13 @@ def from_front(photo: Photo, points: Array, width: float) -> Array | None:
     ndarray, shape (m, 2), or None
         None where no front is seen there.
     """
-    s = _lengths(points)
+    s = arc_lengths(points)
     step = _own_step(photo, points, s, width)
     if not step.any() or _may_be_shade(step):
         return None
     low = _known(s, width)[0]
     recent = np.linspace(low, low + _STEP * width * _RECENT, _RECENT, endpoint=False)
-    way = _followed(photo, _at(recent, s, points), step, width)
+    way = _followed(photo, on_polyline(recent, s, points), step, width)
     front = _front(photo, way, step, width)
     return None if front is None else np.vstack([front, points[s > recent[-1]]])
 
@@ -155,11 +156,11 @@ def seen_behind(photo: Photo, points: Array, width: float) -> bool:
     width : float
         Width of the rod, px.
     """
-    s = _lengths(points)
+    s = arc_lengths(points)
     step = _own_step(photo, points, s, width)
     if not step.any():
         return False
-    back = points[0] - _at(np.array([width]), s, points)[0]
+    back = points[0] - on_polyline(np.array([width]), s, points)[0]
     back /= np.hypot(*back)
     far = width * np.arange(*_AGAIN, _AGAIN_STEP)
     seen = np.zeros(len(far), np.bool_)
@@ -168,10 +169,6 @@ def seen_behind(photo: Photo, points: Array, width: float) -> bool:
         seen |= (_shares(_across(photo, spots, width), step) > _SEEN).all(axis=0)
     lost = [k for k, here in enumerate([*seen, False]) if not here]
     return bool(max(np.diff([-1, *lost])) > _RUN)
-
-
-def _lengths(points: Array) -> Array:
-    return np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
 
 
 def _known(s: Array, width: float) -> tuple[float, float]:
@@ -185,7 +182,7 @@ def _own_step(photo: Photo, points: Array, s: Array, width: float) -> Array:
 
     Its own shade, on one side, makes a light rod's step higher, and may end before.
     """
-    known = _at(np.linspace(*_known(s, width), _STATIONS), s, points)
+    known = on_polyline(np.linspace(*_known(s, width), _STATIONS), s, points)
     on, *sides = _across(photo, known, width)
     steps = [np.median(on - side, axis=0) for side in sides]
     return np.asarray(min(steps, key=lambda each: float(np.linalg.norm(each))))
@@ -196,11 +193,6 @@ def _may_be_shade(step: Array) -> bool:
     grey = -float(step.mean())
     aside = float(np.linalg.norm(step + grey)) if len(step) > 1 else 0.0
     return bool(0.0 < grey < _DEEPEST and aside < _COLOURLESS * grey)
-
-
-def _at(along: Array, s: Array, points: Array) -> Array:
-    """Return points at arc lengths."""
-    return np.column_stack([np.interp(along, s, axis) for axis in points.T])
 
 
 def _followed(photo: Photo, way: Array, rise: Array, width: float) -> Array:
@@ -228,9 +220,9 @@ def _followed(photo: Photo, way: Array, rise: Array, width: float) -> Array:
 
 def _front(photo: Photo, way: Array, rise: Array, width: float) -> Array | None:
     """Return a way from the front of a clamp on, where there is one across it."""
-    s = _lengths(way)
+    s = arc_lengths(way)
     u = np.arange(s[-1], 0.0, -1.0)  # outwards
-    way = _at(u, s, way)
+    way = on_polyline(u, s, way)
     light = _across(photo, way, width)
     lost = max(_GONE * width, _GONE_PX)
     ends = [_lost_at(share > _SEEN, round(lost)) for share in _shares(light, rise)]
@@ -303,9 +295,4 @@ def _across(
 
 def _log_light(photo: Photo, spots: Array) -> Array:
     """Return logarithms of light at places, (..., c)."""
-    light = photo.colour_at(spots)
-    if light is None:
-        last = np.array(photo.size_px) - 1
-        x, y = np.moveaxis(np.rint(spots).astype(int).clip(0, last), -1, 0)
-        light = photo.grey[y, x][..., None].astype(np.float64)
-    return np.asarray(np.log(light + _LEAST_LIGHT))
+    return np.asarray(np.log(photo.light_at(spots) + _LEAST_LIGHT))

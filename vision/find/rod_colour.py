@@ -60,11 +60,8 @@ def distance_from(photo: Photo, colour: str) -> Callable[[Array], float]:
         known = np.array([known[0], 0.0, 0.0])
 
     def distance(points_px: Array) -> float:
-        thing = photo.colour_at(points_px)
-        if thing is None:
-            x, y = np.rint(points_px).astype(int).T
-            thing = photo.grey[y, x][:, None]
-        away = _lab(np.median(thing, axis=0) / white) - known
+        thing = np.median(photo.light_at(points_px), axis=0)
+        away = _lab(thing / white) - known
         return float(np.hypot(_LIGHTNESS * away[0], np.hypot(*away[1:])))
 
     return distance

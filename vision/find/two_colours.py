@@ -14,7 +14,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from ..curve.curve import arc_lengths
 from ..picture.photo import Photo
+from ..picture.sample import nearest_pixels
 from .candidate import Candidate
 from .ground import STANDS_OUT, View, about, beside, box_about
 from .shadeless import lanes_beside, nearest_band
@@ -75,7 +77,7 @@ def in_parts(photo: Photo, rod: Candidate, view: View) -> tuple[Candidate, View]
     """
     _, points, _ = resample(rod.points_px, 0.6 * rod.width_px)
     spots = beside(points, _AWAY * rod.width_px, photo.grey.shape)
-    light = _light_at(photo, np.stack(spots))
+    light = photo.light_at(np.stack(spots))
     inside, paper = light[0].clip(1e-3), 0.5 * (light[1] + light[2])
     share = (paper - inside) / np.maximum(paper, inside)
     part = _parts(share, spots[0], rod.width_px)
@@ -106,8 +108,7 @@ def _centred(
     """
     points, normals, across = lanes_beside(rod)
     spots = points[:, None] + across[:, None] * normals[:, None]
-    height, width = view.grey.shape
-    light = _grey_at(view, spots.clip(0, [width - 1, height - 1]))
+    light = nearest_pixels(view.grey, spots).astype(np.float64)
     sides = nearest_band(light < _PAPER - 0.5 * STANDS_OUT, across)
     wide = np.ptp(sides, axis=1)
     nearest = np.hypot(*np.moveaxis(points[:, None] - places, -1, 0)).argmin(axis=1)
@@ -130,15 +131,6 @@ def _mix(rod: Array, paper: Array) -> Array:
     within += _LAMP**2 * (np.outer(rod, rod) + np.outer(paper, paper))
     mix = np.linalg.solve(within, paper - rod)
     return np.asarray(STANDS_OUT * mix / (mix @ (paper - rod)))
-
-
-def _light_at(photo: Photo, places: Array) -> Array:
-    """Return the light of each colour at places, (..., 1 or 3)."""
-    colours = photo.colour_at(places)
-    if colours is not None:
-        return colours
-    x, y = np.moveaxis(np.rint(places).astype(int), -1, 0)
-    return np.asarray(photo.grey[y, x][..., None], np.float64)
 
 
 def _parts(share: Array, points: Array, width: float) -> Labels | None:
@@ -175,7 +167,7 @@ def _size(vectors: Array) -> Array:
 
 def _has_long_parts(part: Labels, points: Array, width: float) -> bool:
     """Whether each part is longer than a speck."""
-    s = np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
+    s = arc_lengths(points)
     change = np.flatnonzero(np.diff(part))
     ends = np.concatenate([[0.0], 0.5 * (s[change] + s[change + 1]), [s[-1]]])
     return len(change) <= _CHANGES and bool(np.diff(ends).min() > _RUN * width)
@@ -183,15 +175,10 @@ def _has_long_parts(part: Labels, points: Array, width: float) -> bool:
 
 def _are_alike(view: View, spots: tuple[Array, Array, Array], part: Labels) -> bool:
     """Whether one light tells both parts about as well."""
-    light = [_grey_at(view, places) for places in spots]
+    light = nearest_pixels(view.grey, np.stack(spots)).astype(np.float64)
     step = view.sign * (0.5 * (light[1] + light[2]) - light[0])
     one, other = (float(np.median(step[part == k])) for k in range(2))
     return min(one, other) > _ALIKE * max(one, other)
-
-
-def _grey_at(view: View, places: Array) -> Array:
-    x, y = np.moveaxis(np.rint(places).astype(int), -1, 0)
-    return np.asarray(view.grey[y, x], np.float64)
 
 
 def _nearest_part(

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ...core.errors import VisionError
 from ...core.picture import MAX_PIXELS, PNG, check_whole
 from .header import HEIF, Header, by_profile, decode_heif, read_header
+from .sample import nearest_pixels
 
 MIN_SIDE = 16
 
@@ -82,10 +83,21 @@ class Photo:
         pixels = None if self.decode is None else self.decode()
         if pixels is None or pixels.ndim != 3 or pixels.shape[2] < 3:
             return None
-        last = np.array(self.size_px) - 1
-        x, y = np.moveaxis(np.rint(points_px).astype(int).clip(0, last), -1, 0)
-        light = _linear(np.ascontiguousarray(pixels[y, x, :3]), linear=False)
-        return np.asarray(light, np.float64)
+        values = np.ascontiguousarray(nearest_pixels(pixels, points_px)[..., :3])
+        return np.asarray(_linear(values, linear=False), np.float64)
+
+    def light_at(self, points_px: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the same, or the light of a grey picture; shape (..., 3) or (..., 1).
+
+        Parameters
+        ----------
+        points_px : ndarray, shape (..., 2)
+            Places (x, y); those beyond the picture are taken at its border.
+        """
+        colours = self.colour_at(points_px)
+        if colours is not None:
+            return colours
+        return np.asarray(nearest_pixels(self.grey, points_px)[..., None], np.float64)
 
     @property
     def size_px(self) -> tuple[int, int]:
