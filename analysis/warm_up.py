@@ -21,7 +21,7 @@ def is_warm() -> bool:
     """
     from ..sim.planar.solver import solve_rows
     from ..sim.solid.newton import solve_shape
-    from ..vision.edge.edges import _sample
+    from ..vision.edge.profiles import _sample
 
     kernels = (solve_rows, solve_shape, _sample)
     return all(kernel.is_stored or not kernel.cache_folder for kernel in kernels)

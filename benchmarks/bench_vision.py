@@ -27,9 +27,9 @@ from magbend.vision.synthetic.square_view import frames
 
 STAGES = {
     "binarise": "find.choose", "find_candidates": "find.choose",
-    "start_curve": "extraction.extract", "refine": "extraction.extract",
-    "find_joints": "extraction.refine", "measurement": "extraction.extract",
-    "doubts": "extraction.extract",
+    "start_curve": "extraction.best_light", "refine": "extraction.finish",
+    "find_joints": "extraction.midline", "measurement": "extraction.finish",
+    "doubts": "extraction.finish",
 }  # fmt: skip
 """What is timed, and the module that calls it; joints are sought within `refine`, and
 count for themselves."""

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
-from magbend.vision.edge.edges import _bilinear, find_edges
+from magbend.vision.edge.edges import find_edges
+from magbend.vision.edge.profiles import _bilinear
 from magbend.vision.edge.rough_edges import rough_edges
 from magbend.vision.find.binarise import binarise
 

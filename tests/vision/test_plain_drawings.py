@@ -11,7 +11,7 @@ import pytest
 from magbend.vision import as_photo, extract
 from magbend.vision.camera.calibrate import calibrate_known_length
 from magbend.vision.edge.state import LostError
-from magbend.vision.extraction.extract import measure_candidate
+from magbend.vision.extraction.best_light import measure_candidate
 from magbend.vision.extraction.setting import Setting
 from magbend.vision.find.candidate import Candidate
 from magbend.vision.find.ground import View, best_view
@@ -433,9 +433,10 @@ def colour_shows(monkeypatch, light, kept, aside):
         view = replace(view, grey=grey.astype(np.float32), mix=(1.0, 1.0, -2.0))
         return replace(rod, points_px=points), view
 
-    monkeypatch.setattr(
-        "magbend.vision.extraction.extract.in_its_colour", in_its_colour
-    )
+    for room in ("extract", "best_light"):
+        monkeypatch.setattr(
+            f"magbend.vision.extraction.{room}.in_its_colour", in_its_colour
+        )
 
 
 @pytest.mark.parametrize(("light", "kept"), [(blind, 0.0), (grainy, 1.0)])
@@ -498,7 +499,7 @@ def test_a_rod_wider_than_what_was_told_from_its_shade_is_in_doubt(monkeypatch):
 
     photo = drawn(rod=BLACK, turn_deg=30.0)
     plain = extract(photo, SCALE)
-    monkeypatch.setattr("magbend.vision.extraction.extract.rod_alone", rim)
+    monkeypatch.setattr("magbend.vision.extraction.best_light.rod_alone", rim)
     found = extract(photo, SCALE)
     assert found.ok, found.reason
     assert found.length_mm == pytest.approx(plain.length_mm, abs=0.05)

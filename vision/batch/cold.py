@@ -21,7 +21,8 @@ from ..curve.joints import _evidence, _model
 from ..curve.likelihood import penalised
 from ..curve.spline import penalty_between
 from ..edge.crossings import _fit_line
-from ..edge.edges import _measure_side, _sample
+from ..edge.edges import _measure_side
+from ..edge.profiles import _sample
 from ..edge.rough_edges import _rough_edges
 from ..edge.step_line import _fit_step
 from ..extraction.extract import measure

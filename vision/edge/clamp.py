@@ -20,8 +20,8 @@ from ...core.jit import njit
 from ..curve.curve import Curve
 from ..curve.robust import median, quantiles
 from .crossings import Crossed, EndFace, crossings_of, line_through
-from .edges import clear_of
 from .lanes import lanes, lanes_along
+from .levels import clear_of
 from .step_line import SPAN, STEP_PX, fit_step
 
 Array = NDArray[np.float64]

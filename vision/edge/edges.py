@@ -1,17 +1,14 @@
 """Sub-pixel side edges of a rod: profiles across it, crossed at half level.
 
-Profiles are sampled along the normals by bilinear interpolation of our own (OpenCV's is
-quantised to 1/32 px in some versions). On each side the edge is where the light is half
-way between the rod just inside and the paper just outside: each side has its own
-levels, and the paper's is a straight line carried to the edge, so that a soft shadow
-lying along one side does not pull the edge. For an edge blurred by a Gaussian of
-standard deviation b on paper with slope g, half level lies g b / sqrt(2 pi) above the
-mean of the two levels; that term is kept.
+On each side the edge is where the light is half way between the rod just inside and the
+paper just outside: each side has its own levels, and the paper's is a straight line
+carried to the edge, so that a soft shadow lying along one side does not pull the edge.
+For an edge blurred by a Gaussian of standard deviation b on paper with slope g, half
+level lies g b / sqrt(2 pi) above the mean of the two levels; that term is kept.
 """
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -19,25 +16,21 @@ from numpy.typing import NDArray
 
 from ...core.jit import njit
 from ..curve.robust import _median, median
+from .levels import (
+    _ROOT_2PI,
+    _ROUND_PX,
+    _SLOPE_VARIANCE,
+    _level_filters,
+    clear_of,
+    level_spans,
+)
+from .profiles import STEP_PX, _sample
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 
-STEP_PX = 0.5
-"""Distance of samples along a profile."""
-
 _SHADE = 0.003
 """Slope of the paper beside a rod, per px and contrast, that is no shade yet."""
-
-_ROUND_PX, _EVEN = 6.0, 2.0
-"""Half width of a light rod, px, across which a lamp's shading is seen; and samples,
-times px^2, by which it is taken for even until they tell."""
-
-_ROOT_2PI = 2.5066282746310002
-
-_SLOPE_VARIANCE = 0.171
-"""Variance, px^2, of the place whose slope the line through four samples tells: 0.9 of
-its weight is even over 1.5 px, and 0.1 over 0.5 px."""
 
 
 class Edges(NamedTuple):
@@ -250,70 +243,6 @@ def _both_sides(
 
 
 @njit(cache=True)
-def clear_of(blur: float) -> float:
-    """Return how far from an edge its blur hardly reaches, px."""
-    return max(1.5, 2.2 * blur)
-
-
-@njit(cache=True)
-def level_spans(blur: float, fuzz: float) -> tuple[float, float, float]:
-    """Return where levels are taken, px: close to the edge, clear of it; how far on.
-
-    A little farther than the blur itself asks for: on photographs what is closer to the
-    edge is unsure (a rounded edge, the lens's halo).
-    """
-    wide = max(math.hypot(blur, math.sqrt(_SLOPE_VARIANCE)), fuzz)
-    return max(0.6, 1.1 * wide), clear_of(wide), max(4.0, 3.0 * wide)
-
-
-@njit(cache=True)
-def _level_filters(
-    columns: int, before: int, gaps: tuple[float, float], window: float, blur: float,
-    shaded: bool,
-) -> Array:  # fmt: skip
-    """Return the weights of both filters, (6, m): near the edge, then clear of it."""
-    filters = np.empty((6, columns))
-    filters[:3] = _level_filter(columns, before, gaps[0], window, blur, shaded)
-    filters[3:] = _level_filter(columns, before, gaps[1], window, blur, shaded)
-    return filters
-
-
-@njit(cache=True)
-def _level_filter(
-    columns: int, before: int, gap: float, window: float, blur: float, shaded: bool
-) -> Array:
-    """Return the weights of samples in inner level, outer level and its slope, (3, m).
-
-    Least squares of a step onto a slope, both blurred by a Gaussian, on samples at
-    either side, `gap` clear of the edge: so the blurred edge's own tails count neither
-    as rod nor as shade. The outer level is that at the edge. Of a `shaded` rod the
-    inner one slopes too, and is that at the edge but for what the blur adds there.
-    """
-    design = np.zeros((columns, 4 if shaded else 3))
-    for k in range(columns):
-        t = (k - before + 0.5) * STEP_PX
-        if gap <= abs(t) <= gap + window:
-            outside = 0.5 * (1.0 + math.erf(t / (blur * math.sqrt(2.0))))
-            bell = math.exp(-0.5 * (t / blur) ** 2) / _ROOT_2PI
-            design[k, 0] = 1.0 - outside
-            design[k, 1] = outside
-            design[k, 2] = t * outside + blur * bell
-            if shaded:
-                design[k, 3] = t * (1.0 - outside) - blur * bell
-    normal = design.T @ design
-    if shaded:
-        normal[3, 3] += _EVEN
-    if normal[0, 0] < 0.5:
-        # Narrower than the blur: the darkest there is, at the axis.
-        design[0, 0] += 1.0
-        normal = design.T @ design
-    weights = np.linalg.solve(normal, design.T)
-    if shaded:
-        weights[0] -= 2.0 * blur / _ROOT_2PI * weights[3]
-    return np.ascontiguousarray(weights[:3])
-
-
-@njit(cache=True)
 def _smooth(rows: Array, half: int) -> None:
     """Replace each value by the mean over its neighbours in the row, NaN left out."""
     count = rows.shape[1]
@@ -329,52 +258,6 @@ def _smooth(rows: Array, half: int) -> None:
                 number -= 1
             if i >= 0:
                 row[i] = total / number if number else np.nan
-
-
-@njit(cache=True)
-def _bilinear(grey: Image, x: float, y: float) -> float:
-    height, width = grey.shape
-    if not (x >= 0.0 and y >= 0.0 and x <= width - 1.0 and y <= height - 1.0):
-        return np.nan
-    j = min(int(x), width - 2)
-    i = min(int(y), height - 2)
-    u, v = x - j, y - i
-    top = grey[i, j] * (1.0 - u) + grey[i, j + 1] * u
-    bottom = grey[i + 1, j] * (1.0 - u) + grey[i + 1, j + 1] * u
-    return float(top * (1.0 - v) + bottom * v)
-
-
-@njit(cache=True)
-def _sample(
-    grey: Image, points: Array, normals: Array, edge: Array, outwards: float,
-    before: int, sign: float, strip: Image,
-) -> None:  # fmt: skip
-    """Fill the strip: a row a station, columns outwards, the edge behind `before`."""
-    count, columns = strip.shape
-    height, width = grey.shape
-    for i in range(count):
-        u, v = outwards * normals[i, 0], outwards * normals[i, 1]
-        first = outwards * edge[i] + (0.5 - before) * STEP_PX
-        last = first + (columns - 1) * STEP_PX
-        x, y = points[i, 0] + first * u, points[i, 1] + first * v
-        far_x, far_y = points[i, 0] + last * u, points[i, 1] + last * v
-        u, v = STEP_PX * u, STEP_PX * v
-        if (
-            min(x, far_x) >= 0.0 and max(x, far_x) < width - 1.001
-            and min(y, far_y) >= 0.0 and max(y, far_y) < height - 1.001
-        ):  # fmt: skip
-            # Well inside: no sample needs to be checked.
-            for k in range(columns):
-                px, py = x + k * u, y + k * v
-                j, m = int(px), int(py)
-                fx, fy = np.float32(px - j), np.float32(py - m)
-                a, b = grey[m, j], grey[m, j + 1]
-                c, d = grey[m + 1, j], grey[m + 1, j + 1]
-                top = a + (b - a) * fx
-                strip[i, k] = sign * (top + (c + (d - c) * fx - top) * fy)
-            continue
-        for k in range(columns):
-            strip[i, k] = sign * _bilinear(grey, x + k * u, y + k * v)
 
 
 @njit(cache=True)

@@ -21,7 +21,7 @@ from .clamp import (
 )
 from .clamp_light import STEP, clamp_light
 from .crossings import EndFace
-from .edges import clear_of
+from .levels import clear_of
 from .state import LostError, Root, Seen, State
 from .tip import find_tip
 from .wall_light import MIRRORED, SKY, Walls, short_of_end, wall_light

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ...core.jit import njit
 from ..curve.curve import Curve, points_at
-from .edges import _bilinear
+from .profiles import _bilinear
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from ..curve.curve import beside
 from ..curve.robust import median
-from .edges import STEP_PX
 from .flank import median_profiles
 from .highlight import fit_bars
 from .lanes import sample_lanes
+from .profiles import STEP_PX
 from .state import Seen, State
 
 Array = NDArray[np.float64]

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.jit import njit
-from .edges import STEP_PX, _sample
+from .profiles import STEP_PX, _sample
 
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,6 +37,12 @@ class LostError(Exception):
         self.flag = flag
         self.reason = reason
         self.seen_px = tuple(seen_px)
+
+
+BROKEN = (
+    np.linalg.LinAlgError, ArithmeticError, ValueError, IndexError, cv2.error
+)  # fmt: skip
+"""What numerics raise on pictures that hold no rod after all."""
 
 
 @dataclass(slots=True)

@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.jit import njit
-from .edges import Edges, level_spans
+from .edges import Edges
+from .levels import level_spans
 from .state import Seen, State
 
 Array = NDArray[np.float64]

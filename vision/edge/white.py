@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..curve.curve import beside, normals_of
-from .edges import STEP_PX, _sample
 from .flank import WHITE, Flanks, fit_flanks, is_held, median_profiles
+from .profiles import STEP_PX, _sample
 from .state import Seen, State
 from .wall_light import MIRRORED, SKY, Walls, reflectance
 

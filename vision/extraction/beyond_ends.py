@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from ...core.jit import njit
 from ..curve.robust import median, quantile, quantiles
-from ..edge.edges import clear_of
 from ..edge.lanes import lanes
+from ..edge.levels import clear_of
 from ..edge.state import LostError, Root
 from ..find.ground import View
 from ..find.held import seen_behind

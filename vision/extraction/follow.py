@@ -17,14 +17,15 @@ from numpy.typing import NDArray
 from ...core.errors import MagbendError
 from ..camera.oriented import oriented
 from ..curve.curve import Curve, arc_lengths
-from ..edge.state import LostError, Root
+from ..edge.state import BROKEN, LostError, Root
 from ..find.candidate import Candidate
 from ..find.ground import View, mixed
 from ..find.track import Start, start_curve
 from ..measurement import Measurement
 from ..picture.photo import Photo
 from .bare import flattened
-from .extract import BROKEN, finish, measure
+from .extract import measure
+from .finish import finish
 from .motion import begun, expected, moved_on
 from .quality import is_as_before
 from .setting import Setting

@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from ...core.errors import InputError, MagbendError
 from ..camera.calibrate import calibrate_known_length
 from ..camera.oriented import oriented
-from ..edge.state import LostError, Root
+from ..edge.state import BROKEN, LostError, Root
 from ..find.candidate import Candidate
 from ..find.ground import best_view
 from ..measurement import Measurement, failure
 from ..picture.photo import Photo
 from ..picture.sample import nearest_pixels
 from ..picture.turn import turned_points
-from .extract import BROKEN, measure_candidate
+from .best_light import measure_candidate
 from .setting import Setting
 
 Array = NDArray[np.float64]

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from ..curve.curve import Curve, beside
 from ..curve.robust import median
-from ..edge.edges import clear_of
 from ..edge.highlight import Bars
 from ..edge.lanes import sample_lanes
+from ..edge.levels import clear_of
 from ..find.ground import View
 
 Array = NDArray[np.float64]

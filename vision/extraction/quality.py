@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from ..curve.robust import quantile
 from ..edge.clamp import DARKEST, DIMMED, is_dark_line
-from ..edge.edges import clear_of
 from ..edge.ends import APART_PX
 from ..edge.flank import WHITE
+from ..edge.levels import clear_of
 from ..edge.state import LostError
 from ..edge.white import SOME
 from ..find.candidate import Candidate

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...core.jit import njit
 from ..curve.curve import beside
 from ..curve.robust import median
-from ..edge.edges import clear_of
+from ..edge.levels import clear_of
 from ..find.candidate import Candidate
 from .strip import PARTS, Strip
 

@@ -17,7 +17,7 @@ from ..curve.curve import Curve, normals_of
 from ..curve.fit import fit_curve
 from ..curve.problem import SHARED
 from ..curve.robust import median
-from ..edge.edges import STEP_PX, _bilinear
+from ..edge.profiles import STEP_PX, _bilinear
 from ..edge.rough_edges import SHADED_LEVEL, rough_edges
 
 Array = NDArray[np.float64]
