@@ -23,6 +23,7 @@ from magbend.vision.synthetic import (
 )
 
 NO_FRONT = 0.0, np.inf
+SEEN = 60.0
 ANGLE = 4.0
 CAMERA = scene_camera(
     size_px=(900, 720), focal_px=1000.0, height_mm=56.0, tilt_deg=11.0,
@@ -31,7 +32,7 @@ CAMERA = scene_camera(
 
 
 def test_without_a_front_the_place_turns_the_direction_with_it():
-    shift, covariance, apart = joint(0.5, 1e-3, 4e-3, *NO_FRONT)
+    shift, covariance, apart = joint(0.5, 1e-3, 4e-3, *NO_FRONT, SEEN)
     assert shift.tolist() == [0.0, 0.0]
     assert apart == 0.0
     turned = 4e-3 * 0.5
@@ -41,7 +42,7 @@ def test_without_a_front_the_place_turns_the_direction_with_it():
 
 
 def test_two_readings_of_a_straight_rod_are_weighed_by_their_squares():
-    shift, covariance, _ = joint(0.1, 2e-3, 0.0, 1e-3, 1e-3)
+    shift, covariance, _ = joint(0.1, 2e-3, 0.0, 1e-3, 1e-3, SEEN)
     assert shift == pytest.approx([0.0, 0.8e-3])
     assert covariance[1, 1] == pytest.approx(1.0 / (1.0 / 4e-6 + 1.0 / 1e-6))
 
@@ -49,7 +50,7 @@ def test_two_readings_of_a_straight_rod_are_weighed_by_their_squares():
 def test_where_a_bent_rod_looks_tells_where_it_leaves_its_clamp():
     """A place in doubt by 5 px, and a direction known to what the rod turns on 1 px."""
     bend, true = 4e-3, 3.0
-    shift, covariance, _ = joint(5.0, 1e-4, bend, bend * true, bend)
+    shift, covariance, _ = joint(5.0, 1e-4, bend, bend * true, bend, SEEN)
     assert shift[0] == pytest.approx(true, rel=0.1)
     assert shift[1] == pytest.approx(bend * true, rel=0.1)
     assert np.sqrt(covariance[0, 0]) < 1.05
@@ -58,13 +59,22 @@ def test_where_a_bent_rod_looks_tells_where_it_leaves_its_clamp():
 @pytest.mark.parametrize(("rod_sd", "believed"), [(1e-3, "rod"), (2e-2, "front")])
 def test_what_disagrees_is_not_averaged_away(rod_sd, believed):
     turn, turn_sd = 0.1, 5e-3
-    shift, covariance, apart = joint(0.05, rod_sd, 0.0, turn, turn_sd)
+    shift, covariance, apart = joint(0.05, rod_sd, 0.0, turn, turn_sd, SEEN)
     assert apart > APART
     assert shift[1] == pytest.approx(
         turn if believed == "front" else 0.0, abs=0.1 * turn
     )
-    agreed = joint(0.05, rod_sd, 0.0, 0.0, turn_sd)[1]
+    agreed = joint(0.05, rod_sd, 0.0, 0.0, turn_sd, SEEN)[1]
     assert covariance[1, 1] > 1.5 * agreed[1, 1]
+
+
+def test_a_front_askew_by_more_than_is_known_puts_its_place_in_doubt():
+    rod_sd, turn_sd, place_sd = 1e-3, 4e-3, 0.05
+    as_known = joint(place_sd, rod_sd, 0.0, 3e-3, turn_sd, SEEN)[1]
+    assert np.sqrt(as_known[0, 0]) == pytest.approx(place_sd)
+    for turn in (0.02, 0.2):
+        covariance = joint(place_sd, rod_sd, 0.0, turn, turn_sd, SEEN)[1]
+        assert np.sqrt(covariance[0, 0]) > 0.9 * turn * SEEN
 
 
 def test_an_end_on_the_rod_that_no_front_checks_is_doubted_more():

@@ -29,7 +29,7 @@ Image = NDArray[np.float32]
 
 _LANES = np.linspace(-0.5, 0.5, 9)
 _BESIDE = np.linspace(0.5, 2.0, 13)
-FACE_SEEN, _FRONT_SEEN = 0.6, 3.0
+FACE_SEEN, FRONT_SEEN = 0.6, 3.0
 """Widths of the rod over which the two lines are seen."""
 _SHADED = 0.03
 """Light times px by which shade and grain move a line seen over one width of a rod,
@@ -94,7 +94,7 @@ class ClampLines:
 
 def between(first: float, second: float, lines: ClampLines) -> float:
     """Return the place by the least squares of those that each of two lines tells."""
-    a, b = _sureness(lines.face, FACE_SEEN), _sureness(lines.front, _FRONT_SEEN)
+    a, b = _sureness(lines.face, FACE_SEEN), _sureness(lines.front, FRONT_SEEN)
     return (a * first + b * second) / (a + b) if a + b > 0.0 else 0.5 * (first + second)
 
 

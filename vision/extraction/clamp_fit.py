@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera.calibration import Calibration
+from ..edge.clamp import FRONT_SEEN
 from ..edge.crossings import EndFace
 from ..edge.wall_light import WALL_PLACES
 from ..find.ground import View
@@ -86,7 +87,8 @@ def fit_clamp(
     bend = -float(np.interp(root.s, curve.s, curve.kappa))
     edge = EDGE_MM * float(view.along[0])
     place_sd = math.hypot(root.sd, white_px(refined), edge)
-    shift, covariance, apart = joint(place_sd, rod_sd, bend, turn, turn_sd)
+    seen = FRONT_SEEN * refined.typical_width
+    shift, covariance, apart = joint(place_sd, rod_sd, bend, turn, turn_sd, seen)
     own_sd_deg = math.degrees(math.sqrt(covariance[1, 1]))
     angle_deg, sd_deg, flags = surer_direction(
         told, math.degrees(heading + shift[1]), own_sd_deg
@@ -103,8 +105,9 @@ def fit_clamp(
 
 
 def joint(
-    place_sd: float, rod_sd: float, bend: float, turn: float, turn_sd: float
-) -> tuple[Array, Array, float]:
+    place_sd: float, rod_sd: float, bend: float, turn: float, turn_sd: float,
+    seen: float,
+) -> tuple[Array, Array, float]:  # fmt: skip
     """Return place and direction by least squares of what lines, rod and front tell.
 
     Parameters
@@ -117,29 +120,37 @@ def joint(
     turn, turn_sd : float
         By how much the front's direction is off the rod's where the lines tell the
         place, and its deviation, rad; infinite where no front is seen.
+    seen : float
+        Length of the front that is seen, px.
 
     Returns
     -------
     shift : ndarray, shape (2,)
         Of place and direction, px and rad.
     covariance : ndarray, shape (2, 2)
-        Of these: wider by the part of `apart` above `APART`.
+        Of these: wider by the part of `apart` above `APART`, and of a front askew.
     apart : float
         By how many deviations rod and front differ.
 
     Notes
     -----
     Beyond `APART` the clamp may not be square, or the rod's tangent may be wrong. A rod
-    that is surer than the front is then believed alone.
+    that is surer than the front is then believed alone. A front that is more askew than
+    the deviations tell may be of something else, a shade or a chamfer, and its place is
+    then off by as much as that turns it over its length.
     """
     rows = np.array([[1.0, 0.0], [-bend, 1.0], [0.0, 1.0]])
     weight = np.array([place_sd, rod_sd, turn_sd]) ** -2.0
-    apart = abs(turn) / math.hypot(place_sd * bend, rod_sd, turn_sd)
+    expected = math.hypot(place_sd * bend, rod_sd, turn_sd)
+    apart = abs(turn) / expected
     if apart > APART and rod_sd < turn_sd:
         weight[2] = 0.0
     covariance = np.linalg.inv((rows.T * weight) @ rows)
     shift = covariance[:, 1] * weight[2] * turn
-    return shift, covariance * max(1.0, apart / APART) ** 2, apart
+    askew = math.sqrt(max(turn**2 - expected**2, 0.0))
+    moved = seen * askew * np.array([1.0, bend])
+    covariance = covariance * max(1.0, apart / APART) ** 2 + np.outer(moved, moved)
+    return shift, covariance, apart
 
 
 def _front(

@@ -23,11 +23,11 @@ from .setting import UNKNOWN_CLAMP_MM, Setting
 HIDDEN_MM = 0.05
 """What part of the root a clamp of unknown height may hide before that is named."""
 
-BORDER_PX, CARRIED, BETWEEN, SMEARED = 0.3, 0.002, 0.15, 1.3
+BORDER_PX, CARRIED, BETWEEN, SMEARED = 0.3, 0.002, 0.15, 0.8
 """Standard deviation of a place: px, of where a rod enters the picture; as shares of
 how far a line is carried to the height of the axis, of how far two lines are apart, and
 of what blurs a line more than the rod's sides and its tip: the front of a shade, seen
-as one line with the clamp's (errors of 0.6 to 2 times that on drawings)."""
+as one line with the clamp's (errors of 0.1 to 1 times that on most drawings)."""
 
 UNCHECKED = 2.5
 """And over that of the rod's end on its own lanes where no front is seen beside it: the
