@@ -21,10 +21,11 @@ def is_warm() -> bool:
     """
     from ..sim.planar.solver import solve_rows
     from ..sim.solid.newton import solve_shape
-    from ..vision.edge.profiles import _sample
+    from ..vision.batch.cold import is_cold
 
-    kernels = (solve_rows, solve_shape, _sample)
-    return all(kernel.is_stored or not kernel.cache_folder for kernel in kernels)
+    if not solve_rows.cache_folder:
+        return True
+    return solve_rows.is_stored and solve_shape.is_stored and not is_cold()
 
 
 def warm_up() -> None:
@@ -69,23 +70,12 @@ def _curve() -> None:
 
 
 def _photograph() -> None:
-    from ..core.centreline import Centreline
-    from ..vision import as_photo, extract
-    from ..vision.measurement import Pose
-    from ..vision.synthetic import Block, Scene, render_scene, scene_camera
+    from ..vision.batch.cold import compile_kernels
+    from ..vision.synthetic import curve
     from .compare import metrics
 
-    s = np.linspace(0.0, 30.0, 121)
-    arc = Centreline(
-        s_mm=s, x_mm=60.0 * np.sin(s / 60.0), y_mm=60.0 * (1.0 - np.cos(s / 60.0)),
-        theta_rad=s / 60.0, kappa_per_mm=np.full_like(s, 1.0 / 60.0),
-    )  # fmt: skip
-    camera = scene_camera()
-    clamp = Block(pose=Pose(x_mm=16.0, y_mm=-30.0, angle_deg=0.0, height_mm=0.9))
-    scene = Scene(clamp=clamp, centreline=arc)
-    picture = render_scene(scene, camera, np.random.default_rng(0))
-    measured = extract(as_photo(picture), camera, rod_height_mm=0.9, joints_mm=(10.0,))
-    metrics.shape_errors(measured.centreline() or arc, arc)
+    compile_kernels()
+    metrics.shape_errors(curve("arc", angle_deg=29.0), curve("arc", angle_deg=30.0))
 
 
 def main(tell: Callable[[str], object] = sys.stderr.write) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import itertools
 import os
 import threading
 import warnings
@@ -172,7 +173,7 @@ def _one_at_a_time(compiled: Any) -> Callable[[Any], Any]:
     """
     from numba.core.compiler_lock import global_compiler_lock
 
-    compile_, file = compiled.compile, f"{compiled._cache._cache_file._index_path}.lock"
+    compile_, file = compiled.compile, compiled._cache._cache_file
 
     def compile_in_turn(signature: Any) -> Any:
         with global_compiler_lock, ExitStack() as held:
@@ -180,10 +181,28 @@ def _one_at_a_time(compiled: Any) -> Callable[[Any], Any]:
                 with suppress(ImportError, OSError):  # a system or disk without locks
                     from fcntl import LOCK_EX, flock
 
-                    flock(held.enter_context(Path(file).open("w")), LOCK_EX)
+                    lock = Path(f"{file._index_path}.lock")
+                    flock(held.enter_context(lock.open("w")), LOCK_EX)
+                _remove_outdated(file)
             return compile_(signature)
 
     return compile_in_turn
+
+
+def _remove_outdated(file: Any) -> None:
+    """Remove the machine code of another version of a kernel.
+
+    Numba notes the name of new code before it writes the code: a process that is ended
+    in between would leave the old code under that name.
+    """
+    if file._load_index():
+        return
+    for number in itertools.count(1):
+        path = Path(file._data_path(file._data_name(number)))
+        if not path.exists():
+            return
+        with suppress(OSError):
+            path.unlink()
 
 
 def _codes(code: CodeType) -> list[CodeType]:

@@ -29,6 +29,19 @@ def pytest_configure() -> None:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown() -> Iterator[None]:
+    """Refuse a test after which numba keeps kernels elsewhere than before it.
+
+    Numba reads its environment when it compiles, and not again once a test has put
+    that back: the kernels of all later tests would be cold.
+    """
+    yield
+    numba = sys.modules.get("numba")
+    if numba is not None:
+        assert os.environ.get("NUMBA_CACHE_DIR", "") == numba.config.CACHE_DIR
+
+
 @pytest.fixture(autouse=True)
 def system_temp(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Give each test a system folder of its own for control sockets.

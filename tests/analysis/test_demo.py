@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from magbend.analysis import demo
+from magbend.analysis import demo, warm_up
 from magbend.core.errors import RigError, StoreError
+from magbend.sim.planar.solver import solve_rows
+from magbend.vision.batch import cold
 
 
 def quiet(_line: str) -> None:
@@ -37,3 +39,12 @@ def test_a_second_demo_gets_the_next_free_name(
         with pytest.raises(RigError, match="enough"):
             demo.run_demo(tmp_path / "demo", seed=2, tell=quiet)
     assert asked == ["run_001", "run_002"]
+
+
+def test_nothing_is_called_warm_that_photographs_find_cold(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    if not solve_rows.cache_folder:
+        pytest.skip("no folder keeps kernels here")
+    monkeypatch.setattr(cold, "is_cold", lambda: True)
+    assert not warm_up.is_warm()

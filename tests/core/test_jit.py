@@ -128,6 +128,13 @@ def outer(x):
 stored = outer.is_stored
 print(stored, outer(1.0))
 """
+ENDED = """
+import os
+from numba.core.caching import IndexDataCacheFile
+
+IndexDataCacheFile._save_data = lambda *_: os._exit(3)
+import outer
+"""
 
 
 def test_stored_code_is_not_used_once_a_kernel_it_holds_has_changed(
@@ -145,6 +152,11 @@ def test_stored_code_is_not_used_once_a_kernel_it_holds_has_changed(
     assert run(2.0) == "False 3.0"
     assert run(2.0) == "True 3.0"
     assert run(5.0) == "False 6.0"
+    (tmp_path / "ended.py").write_text(ENDED)
+    (tmp_path / "inner.py").write_text(INNER.format(factor=7.0))
+    ended = subprocess.run([sys.executable, "-B", tmp_path / "ended.py"], check=False)
+    assert ended.returncode == 3
+    assert run(7.0).endswith("8.0")
 
 
 WAITING = """
@@ -199,10 +211,7 @@ def test_kernels_run_where_nothing_may_be_written(tmp_path: Path) -> None:
     assert done.stdout.strip() == "8.0 False"
 
 
-def test_a_kernel_that_was_only_looked_at_is_not_at_hand(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+def test_a_kernel_that_was_only_looked_at_is_not_at_hand() -> None:
     kernel = jit.Kernel(lambda x: x + 1.0, {})
     assert not kernel.is_stored
     assert not kernel.is_at_hand  # else the next call would wait for the compiler
