@@ -152,7 +152,7 @@ def _in(folder: Path, pattern: str) -> list[Path]:
 def _folders_of_others() -> Iterator[Path]:
     if os.name != "posix" or os.geteuid() != 0:
         return
-    for folder in sorted(_SYSTEM_TEMP.glob("magbend-*")):
+    for folder in _in(_SYSTEM_TEMP, "magbend-*"):
         user = folder.name.removeprefix("magbend-")
         if user.isdecimal() and user != "0" and not _why_not_ours(folder, int(user)):
             yield folder

@@ -140,3 +140,13 @@ def test_a_rod_is_not_forgotten_for_what_only_pale_levels_show():
     rod, _ = find_rod(photo, Sought())
     assert rod.from_front
     assert rod.away(axis[200]) < 3.0
+
+
+def test_what_is_dark_behind_a_root_in_one_light_alone_is_no_doubt(monkeypatch):
+    """A chuck's flank may be as wide and as dark as the rod, not of its colours."""
+    photo, _ = scene(rod=BLACK, clamp=WHITE)
+    before = extract(photo, None)
+    monkeypatch.setattr(
+        "magbend.vision.extraction.beyond_ends._goes_on_behind", lambda _strip: True
+    )
+    assert extract(photo, None).flags == before.flags

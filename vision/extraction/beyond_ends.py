@@ -72,7 +72,7 @@ even, as a share of the contrast, or of its own step where that may be faint."""
 
 def check_ends(
     photo: Photo, view: View, strip: Strip, refined: Refined, *, root: Root
-) -> bool:
+) -> None:
     """Refuse a rod in a clamp whose root is on bare paper, or whose tip meets a body.
 
     A clamp may be as light as the paper in the light that tells the rod best, but
@@ -80,19 +80,13 @@ def check_ends(
     enters at the border and ends at a body is a rod whose tip is not in the picture,
     turned round.
 
-    Returns
-    -------
-    bool
-        Whether something as wide and as dark as the rod, of other colours, is seen
-        behind its root.
-
     Raises
     ------
     LostError
         With flag and reason.
     """
     if refined.rough:
-        return False
+        return
     if root == "border" and _ends_at_front(strip, refined):
         raise LostError(
             "touches_border",
@@ -100,7 +94,7 @@ def check_ends(
             "clamp: take its free end into the picture, or what lies there away",
         )
     if refined.clamp is None:
-        return False
+        return
     if _on_paper([strip], refined) and _on_paper(
         _colours(photo, view, refined), refined
     ):
@@ -109,8 +103,7 @@ def check_ends(
             "what looks like a rod begins on bare paper: no clamp is seen there",
         )
     axis, width = refined.fit.curve.points, refined.typical_width
-    behind = _goes_on_behind(strip)
-    if behind and seen_behind(photo, axis, width):
+    if _goes_on_behind(strip) and seen_behind(photo, axis, width):
         raise LostError(
             "touches_object",
             "what looks like a rod goes on behind what it grows from: something "
@@ -121,7 +114,6 @@ def check_ends(
             "touches_object",
             "something as dark as the rod lies at its tip: take it away",
         )
-    return behind
 
 
 def _colours(photo: Photo, view: View, refined: Refined) -> list[Strip]:

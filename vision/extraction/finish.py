@@ -77,8 +77,8 @@ def finish(
             candidate = replace(candidate, hidden_px=hidden)
             refined = _refined(photo, view, start, candidate, setting, sd_px, joints)
             strip, result = along_rod(view, refined), None
-        around = refusal(photo, view, strip, refined, candidate)
-        around |= doubts_around(photo, view, strip, refined, candidate, setting)
+        refusal(photo, view, strip, refined, candidate)
+        around = doubts_around(photo, view, strip, refined, candidate, setting)
     if result is None:
         result = _in_mm(photo, view, refined, setting)
     return doubts(result, photo, around, refined, candidate, setting)

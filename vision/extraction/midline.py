@@ -39,7 +39,11 @@ def fit_midline(
     """
     width = state.width
     if last - first < 4.0 * width:
-        raise LostError("no_rod", "what looks like a rod is shorter than four widths")
+        raise LostError(
+            "no_rod",
+            f"what looks like a rod is {(last - first) / width:.1f} widths long: no "
+            "axis can be laid through so little",
+        )
     clear = max(2.0, 2.5 * state.blur)
     # The corner between clamp and paper is dark: edges there are no edges of the rod.
     root = max(clear, ROOT_CLEAR * width) if clamped else clear

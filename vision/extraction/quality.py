@@ -31,6 +31,9 @@ from .strip import Strip
 
 Array = NDArray[np.float64]
 
+LEAST_WIDTHS = 5.0
+"""Length of a rod over its width, at least."""
+
 LENGTH_TOLERANCE = 0.02
 SIDE_TOLERANCE = 0.08
 """A print's side is a few percent off; more is a shade measured with it."""
@@ -73,13 +76,8 @@ more blurred than the rod and its tip; or a tip's, more than the rod."""
 
 def refusal(
     photo: Photo, view: View, strip: Strip, refined: Refined, candidate: Candidate
-) -> set[str]:
+) -> None:
     """Refuse a refined rod that contradicts what was found at first.
-
-    Returns
-    -------
-    set of str
-        The doubt that is left of what it is not refused for.
 
     Raises
     ------
@@ -108,10 +106,13 @@ def refusal(
             "inconsistent",
             "the axis runs over bare paper for a while: two things may cross there",
         )
-    behind = check_ends(photo, view, strip, refined, root=candidate.root)
-    if length < 5.0 * width:
-        raise LostError("no_rod", "what looks like a rod is shorter than five widths")
-    return {CLAMP_DOUBTFUL} if behind else set()
+    check_ends(photo, view, strip, refined, root=candidate.root)
+    if length < LEAST_WIDTHS * width:
+        raise LostError(
+            "no_rod",
+            f"what looks like a rod is {length / width:.1f} widths long; it takes at "
+            f"least {LEAST_WIDTHS:.0f} to tell a rod from other things",
+        )
 
 
 def doubts_around(
