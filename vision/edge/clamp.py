@@ -169,7 +169,7 @@ def find_clamp(
     face = fit_step(
         _face(grey, curve, expected, span, width, near, contrast, reach, sign),
         blur=blur, inner=SPAN * blur, outer=_CLAMP_SPAN * blur, fine=fine,
-        told=_told_blur(front, optics),
+        told=_told_blur(front, optics) if fine else (0.0, math.inf),
     )  # fmt: skip
     if face is not None:
         sigma = _ALIKE * face.sigma

@@ -36,9 +36,9 @@ def saturated(seen: Seen, sign: float) -> float:
     return float(np.mean(light[seen.good] > WHITE))
 
 
-def is_cut_off(grey: Image, seen: Seen, sign: float) -> bool:
+def is_cut_off(grey: Image, white: float) -> bool:
     """Whether so much of a rod lies beside what the sensor could not hold."""
-    return saturated(seen, sign) > SOME and is_held(grey)
+    return white > SOME and is_held(grey)
 
 
 def to_whole_edges(

@@ -38,11 +38,10 @@ def crossings(strip: Strip, refined: Refined, known_px: Array) -> Array:
     ndarray, shape (k, 3)
         Middle (x, y) and radius, px.
     """
-    left, right = strip.lanes(-_ASIDE, _ASIDE)
-    limit = _level(strip, refined, _DARK)
+    limit = _level(strip, _edged(strip, refined), _DARK)
     clear = (strip.s > _CLAMP * strip.width) & (strip.s <= refined.fit.curve.s[-1])
     found = []
-    for side in (left, right):
+    for side in strip.lanes(-_ASIDE, _ASIDE):
         for first, after in _runs((side < limit) & clear):
             points = strip.points[first:after]
             wide = (after - first) / GRID
@@ -61,14 +60,14 @@ def over_paper(strip: Strip, refined: Refined, known_px: Array) -> float:
         return 0.0
     rims = strip.lanes(-_RIM, 0.0, _RIM).min(axis=0)
     along = (strip.s >= 0.0) & (strip.s <= refined.fit.curve.s[-1])
-    bare = along & ~_edged(strip, refined) & (rims > _level(strip, refined, _BARE))
+    edged = _edged(strip, refined)
+    bare = along & ~edged & (rims > _level(strip, edged, _BARE))
     bare &= ~covered(strip.points, known_px)
     return max((float(after - first) / GRID for first, after in _runs(bare)), default=0)
 
 
-def _level(strip: Strip, refined: Refined, share: float) -> float:
+def _level(strip: Strip, edged: NDArray[np.bool_], share: float) -> float:
     """Return the light at a share of the way from the rod's to the paper's."""
-    edged = _edged(strip, refined)
     left, axis, right = strip.lanes(-_ASIDE, 0.0, _ASIDE)[:, edged]
     rod, paper = median(axis), median(np.concatenate([left, right]))
     return rod + share * (paper - rod)
@@ -83,5 +82,7 @@ def _edged(strip: Strip, refined: Refined) -> NDArray[np.bool_]:
 
 def _runs(dark: NDArray[np.bool_]) -> NDArray[np.intp]:
     """Return where stretches begin, and where they are over, shape (n, 2)."""
+    if not dark.any():
+        return np.empty((0, 2), np.intp)
     ends = np.diff(dark.astype(np.int8), prepend=0, append=0)
     return np.column_stack([np.flatnonzero(ends > 0), np.flatnonzero(ends < 0)])

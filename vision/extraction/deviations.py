@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..camera.calibration import Calibration
 from ..camera.projection import LocalView
-from ..curve.robust import median
+from ..curve.robust import median, quantile
 from ..find.ground import View
 from ..measurement import Measurement
 from .refine import Refined
@@ -270,5 +270,5 @@ def _lit_at_clamp(refined: Refined, width: float) -> Array:
     """Return by how much more the light on a rod changes beside its clamp, px."""
     s = refined.fit.curve.s
     rest = refined.relit[s > s[0] + NEAR * width]
-    usual = float(np.quantile(rest, USUAL)) if rest.size else 0.0
+    usual = quantile(rest, USUAL) if rest.size else 0.0
     return np.maximum(refined.relit - usual, 0.0)

@@ -7,6 +7,8 @@ widens as the rod turns away from the vector. A taper widens evenly along the ro
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,21 +39,23 @@ def is_uneven(result: Measurement, setting: Setting) -> bool:
     Seen aslant, as at the border of a near picture, a flat rod and a round one widen
     by different parts as they turn: one of untold section is even if either is.
     """
-    points = result.points
+    points, camera = result.points, setting.calibration
     axis = np.column_stack([points["x_px"], points["y_px"]])
-    seen = [np.ones(len(axis))]
-    if setting.calibration is not None:
-        x, y = np.gradient(axis, axis=0).T
-        view = setting.view(setting.calibration, axis, np.arctan2(y, x))
-        seen = setting.silhouettes(view)
     s, typical = arc_lengths(axis), result.width_px
     use = (points["good"] > 0.5) & np.isfinite(points["width_px"])
     use &= (s > _CLEAR * typical) & (s < s[-1] - _CLEAR * typical)
     if use.sum() < _LEAST:
         return False
+    width = points["width_px" if camera is None else "width_mm"]
     s, theta = s[use], points["theta_rad"][use]
-    widths = [points["width_px"][use] / each[use] for each in seen]
-    return all(_varies(width, s, theta) for width in widths)
+    if not _varies(width[use], s, theta):
+        return False
+    if camera is None or setting.is_round is not None:
+        return True
+    x, y = np.gradient(axis, axis=0).T
+    view = setting.view(camera, axis, np.arctan2(y, x))
+    as_round = points["width_px"] / replace(setting, is_round=True).silhouette(view)
+    return _varies(as_round[use], s, theta)
 
 
 def _varies(width: Array, s: Array, theta: Array) -> bool:

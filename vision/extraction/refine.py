@@ -187,7 +187,7 @@ def refine(
             half_way = seen.edges.middle
             seen = to_wall_ends(state, seen, walls)
             walled = median(np.abs(seen.edges.middle - half_way))
-        if not seeking and is_cut_off(grey, seen, sign):
+        if not seeking and is_cut_off(grey, saturated(seen, sign)):
             seen = to_whole_edges(grey, state, seen, walls, sign, anew=aside > _KEPT_PX)
         if not (seeking or state.rough):
             seen = to_own_width(grey, state, seen, sign)
@@ -202,7 +202,6 @@ def refine(
         width, sigma_width = _smooth_width(
             seen.s, seen.edges.width, seen.good, at, state.width
         )
-        shaded = np.interp(at, seen.s, seen.edges.shaded(state.blur))
         state.curve, state.half = fit.curve, 0.5 * width
         state.first, state.last = 0.0, float(fit.curve.s[-1])
         sought, seeking = seeking, seeking and not turn and aside > _NEAR_PX
@@ -214,6 +213,7 @@ def refine(
         end = tip.s
         moved = abs(first) + abs(end - state.last)
         still_px, ends_px = _NEAR_STILL_PX if in_film else _STILL_PX
+        shaded = np.interp(at, seen.s, seen.edges.shaded(state.blur))
         pulled = shaded + 0.5 * state.blur**2 * np.abs(fit.curve.kappa)
         if not in_film and median(pulled) > _PULLED_PX:
             still_px = _PULLED_STILL_PX
@@ -229,7 +229,7 @@ def refine(
         tip=tip._replace(s=tip.s - first),
         clamp=None if lines is None else lines.shifted(first), rough=state.rough,
         blur=state.blur, joints=None if places is None else places - first,
-        saturated=white, whole=is_cut_off(grey, seen, sign), walled=walled,
+        saturated=white, whole=is_cut_off(grey, white), walled=walled,
         growth=abs(median(seen.edges.growth[seen.good])), settled=settled,
     )  # fmt: skip
 
@@ -263,7 +263,7 @@ def _look(grey: Image, state: State, sign: float, turn: int, *, seeking: bool) -
         )
     state.width = median(edges.width[good])
     blur = edges.blur
-    state.blur = float(np.clip(blur, 0.3, 0.5 * state.width)) if blur > 0 else 1.0
+    state.blur = min(max(blur, 0.3), 0.5 * state.width) if blur > 0 else 1.0
     if (turn == 1 or state.blurs is not None) and not state.rough:
         local = np.clip(edges.blurs(_BLUR_PARTS), 0.3, 0.5 * state.width)
         state.blurs = local if np.ptp(local) > _UNEVEN * state.blur else None

@@ -147,11 +147,6 @@ class Setting:
             return np.hypot(view.across, view.rise_across)
         return view.across + self.height_share * np.abs(view.rise_across)
 
-    def silhouettes(self, view: LocalView) -> list[Array]:
-        """Return the same for each section that the rod may have."""
-        shapes = [False, True] if self.is_round is None else [self.is_round]
-        return [replace(self, is_round=shape).silhouette(view) for shape in shapes]
-
     def wall_px(self, view: LocalView, width_px: Array | float) -> Array:
         """Return how wide a side wall is seen of a rod of a width in pixels."""
         if self.is_round:

@@ -89,8 +89,9 @@ class Strip:
 
 def _nearest(grid: Array, *values: float) -> list[int]:
     """Return the indices of the values of an even grid that are nearest."""
-    first, step, last = float(grid[0]), float(grid[1] - grid[0]), len(grid) - 1
-    return [min(max(round((value - first) / step), 0), last) for value in values]
+    first, second = grid[:2].tolist()
+    step, last = second - first, len(grid) - 1
+    return [min(max(round((float(x) - first) / step), 0), last) for x in values]
 
 
 def _sampled(

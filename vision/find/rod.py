@@ -68,9 +68,9 @@ def find_candidates(binary: Binary) -> list[Candidate]:
     links = np.reshape(np.asarray(tree, dtype=np.int32), (-1, 4))
     found: list[Candidate] = []
     least = 0.04 * max(binary.mask.shape)
-    for index in range(len(contours)):
-        if links[index, 3] >= 0:
-            continue
+    for index in np.flatnonzero(links[:, 3] < 0).tolist():
+        if len(contours[index]) < least:
+            continue  # its points are as many as it is long, at least
         x, y, w, h = cv2.boundingRect(contours[index])
         if max(w, h) < least:
             continue

@@ -91,7 +91,10 @@ def straight_on(sets: LevelSets, light: Array, touching: set[int]) -> Way:
     least = max(_ARM, int(_ARM_PX / sets.step))
     while after[way[-1]]:
         at, later = way[-1], after[way[-1]]
-        if len(later) < 2 or sum(height[part] >= least for part in later) < 2:
+        if len(later) == 1:
+            way += later
+            continue
+        if sum(height[part] >= least for part in later) < 2:
             way.append(_highest(later, height))
             continue
         arms = _ways_from(at, sets, after)
