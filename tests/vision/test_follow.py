@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from magbend.vision import Setting, as_photo, extract, follow
-from magbend.vision.extraction import extract as extract_module
+from magbend.vision.extraction import finish as finish_module
 from magbend.vision.extraction import follow as follow_module
+from magbend.vision.extraction import midline as midline_module
 from magbend.vision.extraction import refine as refine_module
 from magbend.vision.synthetic import Light, curve, draw, signed_distance
 
@@ -97,8 +98,8 @@ def test_what_is_known_of_a_rod_at_rest_is_not_looked_for_again(first, monkeypat
     def look(*_args, **_options):
         raise AssertionError("it was looked for again")
 
-    monkeypatch.setattr(refine_module, "find_joints", look)
-    monkeypatch.setattr(extract_module, "along_rod", look)
+    monkeypatch.setattr(midline_module, "find_joints", look)
+    monkeypatch.setattr(finish_module, "along_rod", look)
     found = follow(as_photo(frame(40.0, seed=3).image), SETTING, first)
     assert found.motion.looked is first.motion.looked
     np.testing.assert_allclose(found.joints_px, first.joints_px, atol=1.0)

@@ -14,14 +14,15 @@ N = 80
 THETA = np.linspace(0.0, 1.4, N)
 
 
-def rod(width):
-    """Return a bent rod 400 px long, measured with a width in px."""
+def rod(width, per_mm=np.nan):
+    """Return a bent rod 400 px long, measured with a width in px, and so many a mm."""
     step = 400.0 / N * np.column_stack([np.cos(THETA), np.sin(THETA)])
     x, y = np.cumsum(step, axis=0).T
     points = {
         "x_px": x, "y_px": y, "theta_rad": THETA, "good": np.ones(N),
-        "width_mm": np.full(N, np.nan), "width_px": np.broadcast_to(width, N),
+        "width_px": np.broadcast_to(width, N),
     }  # fmt: skip
+    points["width_mm"] = points["width_px"] / per_mm
     return Measurement(status="ok", points=points, width_px=float(np.median(width)))
 
 
@@ -48,6 +49,8 @@ def test_a_round_rod_that_a_near_camera_sees_aslant_is_even(told, uneven):
     points = rod(20.0).points
     axis = np.column_stack([points["x_px"], points["y_px"]])
     is_round = Setting(calibration=near, is_round=True)
-    seen = is_round.silhouette(is_round.view(near, axis, THETA))
+    view = is_round.view(near, axis, THETA)
+    seen = is_round.silhouette(view)
     setting = Setting(calibration=near, is_round=told)
-    assert is_uneven(rod(1.0 * seen), setting) == uneven
+    measured = rod(1.0 * seen, setting.silhouette(view))
+    assert is_uneven(measured, setting) == uneven
