@@ -13,9 +13,6 @@ from .cholesky import factor, solved_half
 
 Array = NDArray[np.float64]
 
-_WEAKEST, _FIRST, _STRONGEST = -43, 4, 19
-"""Weights of the penalty that are looked at, in quarters of a decade of the data's."""
-
 _FAIR = 0.1
 """Weight of the penalty before the last step, in units of the data's."""
 
@@ -80,40 +77,21 @@ def _most_likely(
 ) -> float:  # fmt: skip
     """Return the penalty weight of greatest restricted likelihood.
 
-    It is looked for over 15 decades by twos, ever closer, down to a quarter of one. The
-    likelihood has one peak: it is climbed from a weight at which many lie near by, and
-    where one side of the best is better the other is not looked at.
+    It is looked for over 14 decades by twos, then beside the best, ever closer, down to
+    a quarter of a decade.
     """
-    best, step = _FIRST, 8
-    weight = scale * 10.0 ** (0.25 * best)
-    least = _loss(weight, normal, stiff, right, pull, total, stored, count, rank)
+    best, least, step = -12, np.inf, 8
     while step > 0:
-        for side in (1, -1):
-            before = best
-            while _WEAKEST <= best + side * step <= _STRONGEST:
-                weight = scale * 10.0 ** (0.25 * (best + side * step))
-                loss = _loss(
-                    weight, normal, stiff, right, pull, total, stored, count, rank
-                )
-                if not loss < least:
-                    break
-                best, least = best + side * step, loss
-                if step < 8:
-                    break  # what lies beyond is known
-            if best != before:
-                break
+        centre = best
+        for k in range(-3, 4) if step == 8 else range(-1, 2, 2):
+            power = centre + k * step
+            weight = scale * 10.0 ** (0.25 * power)
+            half = factor(normal + weight * stiff)
+            gain = np.sum(solved_half(half, right - weight * pull) ** 2)
+            logs = 2.0 * np.sum(np.log(np.diag(half)))
+            left = max(total + weight * stored - gain, 1e-12 * total + 1e-30)
+            score = count * np.log(left) + logs - rank * np.log(weight)
+            if score < least:
+                best, least = power, score
         step //= 2
     return float(scale * 10.0 ** (0.25 * best))
-
-
-@njit(cache=True)
-def _loss(
-    weight: float, normal: Array, stiff: Array, right: Array, pull: Array, total: float,
-    stored: float, count: float, rank: int,
-) -> float:  # fmt: skip
-    """Return twice the negative logarithm of a penalty weight's likelihood."""
-    half = factor(normal + weight * stiff)
-    gain = np.sum(solved_half(half, right - weight * pull) ** 2)
-    logs = 2.0 * np.sum(np.log(np.diag(half)))
-    left = max(total + weight * stored - gain, 1e-12 * total + 1e-30)
-    return float(count * np.log(left) + logs - rank * np.log(weight))
