@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...core.arrays import real_array
 from ...core.checks import within
-from ...core.errors import InputError
+from ...core.errors import ConfigError, InputError
 from ...core.sources import FLUX_LIMIT_T
 from ...core.table import read_table
 
@@ -34,6 +34,8 @@ MOST_CHARGES = 384
 CUTS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 """Least singular values tried, over the largest: less noise allows a smaller one."""
 COLUMNS = ("x_mm", "y_mm", "z_mm", "Bx_mT", "By_mT", "Bz_mT")
+WIDEST_MM = 1e4
+"""No bench, nor the scanner around one, is mapped over more than 10 m."""
 EDGE = 1e-9
 """How far outside its box, in boxes, a point counts as in it."""
 
@@ -170,11 +172,19 @@ def read_map(path: Path, *, tolerance_mT: float | None = None) -> FieldMap:
     Raises
     ------
     ConfigError
-        If the file is missing, lacks a column or holds something else than numbers.
+        If the file is missing, lacks a column, holds something else than numbers, or
+        its points span more than `WIDEST_MM`.
     """
     read = read_table(path)
     read.require(*COLUMNS, hint="a map is a row a reading")
     table = np.column_stack([read.numbers(name) for name in COLUMNS])
+    widest_mm = float(np.ptp(table[:, :3], axis=0).max())
+    if widest_mm > WIDEST_MM:
+        raise ConfigError(
+            f"{path}: the points of a field map must span at most {1e-3 * WIDEST_MM:g} "
+            f"m; instead received {1e-3 * widest_mm:g} m: check the unit in the heads "
+            "of x, y and z"
+        )
     return FieldMap(
         points_mm=table[:, :3], flux_mT=table[:, 3:], tolerance_mT=tolerance_mT
     )
@@ -200,7 +210,8 @@ def _checked(points_mm: ArrayLike, flux_mT: ArrayLike) -> tuple[Array, Array]:
         raise InputError(
             "Bz_mT of a map with all points at z = 0 must be 0, as the field is taken "
             "to be symmetric about the plane; instead received "
-            f"{np.abs(flux[:, 2]).max():g} mT"
+            f"{np.abs(flux[:, 2]).max():g} mT: write 0 there if this is the probe's "
+            "noise, or add readings off the plane"
         )
     within(float(np.abs(flux).max()), 0.0, FLUX_LIMIT_T * 1e3, "map flux_mT", "mT")
     return points, flux

@@ -35,6 +35,7 @@ from magbend.sim import (
     solve_spatial,
     verify,
 )
+from magbend.sim.magnet.map import read_map
 from magbend.sim.probe import field_table
 
 POSE = {"axis_angle_deg": 70.0, "elevation_deg": 25.0, "centre_mm": (5.0, -80.0, 9.0)}
@@ -329,6 +330,25 @@ def test_a_flat_map_keeps_the_plane() -> None:
     true = solve(gmc(2), magnet).centreline.tip_mm
     assert math.dist(true, solve(gmc(2), field).centreline.tip_mm) < 1e-3
     sensitivities(gmc(2), field, parameters=["E_MPa[0]"])
+
+
+def test_a_map_whose_lengths_are_headed_in_another_unit_is_refused(
+    tmp_path: Path,
+) -> None:
+    magnet = Cuboid(sides_mm=55.0, remanence_T=1.305, gap_mm=60.0)
+    edges = [np.arange(a, b + 1.0, 6.0) for a, b in BOX.T]
+    grid = np.stack(np.meshgrid(*edges, indexing="ij"), axis=-1).reshape(-1, 3)
+    rows = np.hstack([grid, flux_mT(magnet, grid, length_mm=30.0)])
+
+    def written(unit: str) -> Path:
+        head = f"x_{unit},y_{unit},z_{unit},Bx_mT,By_mT,Bz_mT"
+        path = tmp_path / f"{unit}.csv"
+        np.savetxt(path, rows, delimiter=",", header=head, comments="")
+        return path
+
+    np.testing.assert_allclose(read_map(written("mm")).points_mm, grid)
+    with pytest.raises(ConfigError, match=r"10 m; instead received 36 m: .* unit"):
+        read_map(written("m"))
 
 
 def test_a_python_function_is_a_source_too() -> None:
