@@ -94,7 +94,8 @@ def test_a_run_outlives_the_panel_and_is_found_again(tmp_path: Path) -> None:
     os.kill(pid, 0)  # the panel is gone; the run is not
     with served(rig) as second:
         wait_for(lambda: facts_of(second).get("pid") == pid)
-        assert second.panel.supervisor.last_run == name
+        # A run that has just begun has no folder yet.
+        wait_for(lambda: second.panel.supervisor.last_run == name)
         assert second.command("run-abort")["ok"]
         wait_for(lambda: second.panel.supervisor.facts is None)
         assert second.query(f"run?name={name}")["status"] == "abort"
