@@ -114,6 +114,8 @@ def _print_verdict(result: FitResult) -> None:
     say(f"verdict: {verdict.verdict} (p = {verdict.p_value:.2g})")
     for sentence in verdict.reasons:
         say(f"  {sentence}")
+    if verdict.rests_on:
+        say(f"  {verdict.told_sentence()}")
     title = "would explain it" if verdict.reasons else "no more than chance"
     for suspect in verdict.suspects[:3]:
         say(f"  {title}: {suspect.sentence()}")

@@ -59,9 +59,10 @@ def _moved(source: Any, gap_mm: float, along_mm: float) -> Any:
 
 def strength(field: sim.Field, values: Values) -> float:
     """Return by what factor the unknowns change the strength of all sources."""
+    factor = 1.0 + values.get("field_percent", 0.0) / 100.0
     if is_read(field):
-        return 1.0
-    factor = 1.0 + values.get("magnet_percent", 0.0) / 100.0
+        return factor
+    factor *= 1.0 + values.get("magnet_percent", 0.0) / 100.0
     if "magnet_remanence_T" in values:
         factor *= values["magnet_remanence_T"] / remanence_T(field)
     return factor

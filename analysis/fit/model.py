@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ... import sim
 from ...core.cross_section import ALL_SIZES
-from ...core.errors import InputError
+from ...core.errors import InputError, MagbendError
 from ...core.specimen import Section, Specimen
 from ..compare.field import flux_at_tip_mT
 from ..compare.metrics import position_at
@@ -92,7 +92,13 @@ def _bowed(problem: Problem, shot: Shot, unknowns: Array) -> Shot:
     ]
     if any(section.natural_curvature_per_mm is not None for section in rod.sections):
         at[2:] = []  # each section has its own: it is taken as it is
-    solved = [solved_mm(problem, shot, specimen, values) for specimen in at]
+    try:
+        solved = [solved_mm(problem, shot, specimen, values) for specimen in at]
+    except MagbendError:
+        if not np.any(unknowns):
+            raise
+        # A search that other errors drove where no rod can stand: the bow there was.
+        return shot
     seen = [xy_mm for xy_mm in solved if xy_mm is not None]
     if len(seen) < len(at):
         return shot

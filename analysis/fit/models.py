@@ -12,6 +12,9 @@ from .result import FitResult
 from .search import Limits
 from .suspects import alternative
 
+ALIKE = 2.0
+"""Lead in Akaike's criterion up to which a theory is as good as the best."""
+
 
 def compare_models(result: FitResult, limits: Limits) -> tuple[ModelFit, ...]:
     """Return all theories that can be fitted to the same lines, best first.
@@ -78,7 +81,9 @@ def model_sentence(models: tuple[ModelFit, ...]) -> str:
             f"{_NAMES[other.model]} leaves {other.rms_um:.2g} µm "
             f"(AIC +{lead:.3g}{moved})"
         )
+    level = [_NAMES[o.model] for o in others if o.aic - best.aic < ALIKE]
+    judged = f"is as good as {' and '.join(level)}" if level else "is preferred"
     return (
-        f"{_NAMES[best.model]} leaves {best.rms_um:.2g} µm RMS and is preferred: "
+        f"{_NAMES[best.model]} leaves {best.rms_um:.2g} µm RMS and {judged}: "
         f"{'; '.join(parts)}"
     )

@@ -178,6 +178,7 @@ class Owner(NamedTuple):
 
 _SCOPES = {
     "clamp_position_mm": "photograph",
+    "field_percent": "photograph",
     "frame_angle_deg": "frame",
     "clamp_angle_deg": "run",
     "magnet_offset_mm": "run",

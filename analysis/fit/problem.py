@@ -233,7 +233,10 @@ def build_problem(
     _check(runs, model, free, support)
     shots, data, skipped = _collect(runs, model, sources)
     if not shots:
-        raise StoreError(f"no step can be fitted; the first: {skipped[0]}")
+        read = any(usable_flux(step) for run in runs for step in run.steps)
+        lone = model != "uniform" and read and not any(run.magnet for run in runs)
+        way = "; --field uniform fits the readings alone" if lone else ""
+        raise StoreError(f"no step can be fitted; the first: {skipped[0]}{way}")
     held = {_FREED[name]: 0.0 for name in free if name in _FREED}
     if not any(support.gravity_m_s2):
         held["density_percent"] = 0.0

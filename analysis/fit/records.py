@@ -90,6 +90,49 @@ class ModelFit:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Told:
+    """A number that was told, and that the data of a fit cannot test.
+
+    Attributes
+    ----------
+    name : str
+        Its nuisance.
+    number : str
+        What the files say, in words.
+    sd : float
+        How well it is taken to be known: the prior's standard deviation.
+    unit : str
+    moduli_percent : tuple of float
+        Change of each modulus that is known if the number is larger by `sd`.
+    """
+
+    name: str
+    number: str
+    sd: float
+    unit: str
+    moduli_percent: tuple[float, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the words of ``fit.json``."""
+        return {
+            "name": self.name,
+            "number": self.number,
+            "sd": self.sd,
+            "unit": self.unit,
+            "moduli_percent": list(self.moduli_percent),
+        }
+
+    def sentence(self) -> str:
+        """Return it in words."""
+        low, high = min(self.moduli_percent), max(self.moduli_percent)
+        ends = list(dict.fromkeys(f"{end:+.2g}" for end in (low, high)))
+        return (
+            f"{self.number} (+- {self.sd:.2g} {self.unit}; "
+            f"so much more: moduli {' to '.join(ends)} %)"
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
     """Whether a fit can be believed.
 
@@ -108,6 +151,8 @@ class Verdict:
         Doubts of the measurement, and of how many photographs.
     pulls : dict of str to float
         How far each nuisance was pulled from its prior, in standard deviations.
+    rests_on : tuple of Told
+        What was told, moves the moduli, and cannot be tested by the data.
     """
 
     verdict: str
@@ -117,6 +162,7 @@ class Verdict:
     models: tuple[ModelFit, ...]
     flags: dict[str, int]
     pulls: dict[str, float]
+    rests_on: tuple[Told, ...]
 
     def as_dict(self) -> dict[str, Any]:
         """Return the words of ``fit.json``."""
@@ -128,7 +174,15 @@ class Verdict:
             "suspects": [suspect.as_dict() for suspect in self.suspects],
             "models": [model.as_dict() for model in self.models],
             "flags": self.flags,
+            "rests_on": [told.as_dict() for told in self.rests_on],
         }
+
+    def told_sentence(self) -> str:
+        """Return on what the moduli rest, in words; empty where on nothing."""
+        if not self.rests_on:
+            return ""
+        told = ", ".join(told.sentence() for told in self.rests_on)
+        return f"no photograph tests what the moduli rest on: {told}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

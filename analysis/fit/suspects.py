@@ -2,7 +2,8 @@
 
 A score test ranks them all at no cost; the best few are then fitted. Nuisances are
 asked without their prior; changes that have none are asked too: a remanence that grows
-along the rod, a stiffness that changes gradually, the length of one section.
+along the rod, a stiffness that changes gradually, the length of one section, another
+field at one photograph than at the others (a wrong gap, or another step's picture).
 """
 
 from __future__ import annotations
@@ -28,6 +29,13 @@ Array = NDArray[np.float64]
 FEW = 4
 """How many of the best are fitted."""
 
+ENOUGH = 3
+"""Photographs from which on one can be told from the others."""
+
+ODD_PERCENT = 10.0
+"""Least change of the field at one photograph that is tried: a wrong gap or another
+step's picture make more, and less is what errors of the whole bench look like."""
+
 FREE = 30.0
 """Prior standard deviations that count as no prior."""
 
@@ -43,6 +51,8 @@ def scored(result: FitResult) -> list[Suspect]:
     found = []
     for k, (key, sd) in enumerate(zip(wide.nuisances, wide.nuisance_sd, strict=True)):
         step, step_sd = result.linear.score(jacobian[:, p + k])
+        if key[0] == "field_percent" and not abs(step * float(sd)) > ODD_PERCENT:
+            continue
         if math.isfinite(step_sd):
             found.append(
                 Suspect(
@@ -67,6 +77,9 @@ def _asked(problem: Problem) -> dict[tuple[str, int], float]:
             asked[("stiffness_gradient", rod)] = 0.3
         for i in range(sections - 1):
             asked[(f"section_length_mm[{i}]", rod)] = 0.3
+    if len(problem.shots) >= ENOUGH:
+        for shot in problem.shots:
+            asked[("field_percent", shot.owner.photograph)] = 3.0
     return asked
 
 

@@ -7,6 +7,8 @@ model is right it is even between 0 and 1.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
@@ -16,6 +18,7 @@ from .records import Verdict
 from .result import FitResult
 from .search import Limits
 from .suspects import refitted, scored
+from .told import rests_on
 
 Array = NDArray[np.float64]
 
@@ -58,6 +61,11 @@ def judge(result: FitResult, limits: Limits) -> Verdict:
         models=models,
         flags=flags,
         pulls={row["of"]: row["pull"] for row in result.nuisance},
+        rests_on=rests_on(
+            result.problem,
+            result.linear,
+            [i for i, value in enumerate(result.E_MPa) if math.isfinite(value)],
+        ),
     )
 
 

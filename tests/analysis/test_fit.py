@@ -327,3 +327,11 @@ def test_what_runs_away_is_one_sentence_and_no_magnetism_is_refused(tmp_path: Pa
         problem.value(0, 1e4)
     with pytest.raises(InputError, match="load_factor must be above zero for a fit"):
         build_problem([run], support=sim.Support(load_factor=0.0))
+
+
+def test_readings_without_a_magnet_are_told_their_way(tmp_path: Path) -> None:
+    run = replace(load_run(write_run(tmp_path / "run")), magnet=None)
+    with pytest.raises(StoreError, match=r"no magnet: .*; --field uniform fits the"):
+        fit_runs([run])
+    fit = fit_runs([run], model="uniform", judged=False)
+    assert all(math.isfinite(value) for value in fit.E_MPa)

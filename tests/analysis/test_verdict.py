@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from analysis_factory import write_run
 from scipy import stats
-from wrong_models import GAPS_MM, WRONG, all_off, wrong_run
+from wrong_models import GAPS_MM, WRONG, all_off, bench_of, wrong_run
 
 from magbend import sim
 from magbend.analysis import (
@@ -245,3 +245,54 @@ def test_a_picture_without_field_pins_the_bow() -> None:
         rows = fit_runs([run], judged=False).nuisance
         sds += [r["sd"] for r in rows if r["name"] == "natural_curvature_per_mm"]
     assert sds[1] < 0.8 * sds[0]
+
+
+@pytest.mark.parametrize("measured", [True, False])
+def test_what_no_photograph_tests_is_said(measured: bool) -> None:
+    """Told another remanence, the moduli are off by as much as is said."""
+    run, _ = wrong_run(WRONG["bow 1/5000 per mm"], seed=111)
+    if not measured:
+        frames = {k: replace(f, width_mm=math.nan) for k, f in run.frames.items()}
+        run = replace(run, frames=frames)
+    fit = fit_runs([run])
+    assert fit.verdict is not None
+    told = {one.name: one for one in fit.verdict.rests_on}
+    assert set(told) == {"remanence_percent"} | (
+        set() if measured else {"side_percent"}
+    )
+    other = run.specimen.remanence_mT * (1.0 + told["remanence_percent"].sd / 100.0)
+    again = fit_runs(
+        [replace(run, specimen=replace(run.specimen, remanence_mT=other))], judged=False
+    )
+    change = 100.0 * np.log(np.array(again.E_MPa) / fit.E_MPa)
+    assert told["remanence_percent"].moduli_percent == pytest.approx(change, rel=0.05)
+    assert "remanence_mT = " in fit.verdict.told_sentence()
+
+
+def test_a_photograph_of_another_gap_is_named() -> None:
+    """Taken at 55 mm, said to be at 60: the field there is known to be stronger."""
+    bench, _ = bench_of(WRONG["gap +3 mm"], seed=112)
+    run, other = (
+        lines_run(bench, gaps_mm, np.random.default_rng(4))
+        for gaps_mm in (GAPS_MM, (70.0, 55.0, 50.0))
+    )
+    odd = run.steps[1].image
+    frames = run.frames | {odd: other.frames[odd]}
+    verdict = fit_runs([replace(run, frames=frames)]).verdict
+    assert verdict is not None
+    assert verdict.verdict == "contradicted"
+    found = verdict.suspects[0]
+    assert found.name == f"field_percent ({run.label}, step 2)"
+    stronger = bench.flux_mT(55.0) / bench.flux_mT(60.0)
+    assert found.value == pytest.approx(100.0 * (stronger - 1.0), rel=0.1)
+
+
+def test_theories_that_fit_alike_are_not_ranked() -> None:
+    """One photograph tells no field from a uniform one."""
+    bench, errors, rng = all_off(12)
+    verdict = fit_runs([lines_run(bench, (50.0,), rng, errors)]).verdict
+    assert verdict is not None
+    best, second = verdict.models[:2]
+    assert second.aic - best.aic < 2.0
+    assert "is preferred" not in model_sentence(verdict.models)
+    assert " is as good as " in model_sentence(verdict.models)
