@@ -227,6 +227,46 @@ def test_a_camera_close_above_the_board_takes_its_height_by_hand():
     assert found.focal_px == pytest.approx(1500.0, rel=0.03)
 
 
+def lean(camera, at_mm):
+    return (camera.camera_mm[:2] - at_mm) / camera.camera_height_mm
+
+
+def test_a_camera_says_how_well_it_knows_how_squarely_it_looks():
+    rng = np.random.default_rng(11)
+    board = 5.0 * np.stack(np.meshgrid(np.arange(1, 9), np.arange(1, 7)), axis=-1)
+    board_mm = board.reshape(-1, 2)
+    off = []
+    here = np.array([22.0, -17.0])
+    for _ in range(3):
+        truth = scene_camera(focal_px=5000.0, target_mm=(22.0, -17.0), tilt_deg=2.0)
+        centre = truth.centre_px + 0.015 * 1600.0 * rng.standard_normal(2)
+        truth = replace(truth, centre_px=(float(centre[0]), float(centre[1])))
+        points = truth.to_px(board_mm * [1.0, -1.0])
+        points += 0.03 * rng.standard_normal(points.shape)
+        corners = Corners(board_mm=board_mm, points_px=points)
+        prior = default_prior(
+            truth.image_size_px, views=1, distance_mm=truth.camera_height_mm
+        )
+        fit = fit_bundle([corners], truth.image_size_px, prior)
+        found = replace(
+            truth, translation_mm=fit.translations[0],
+            rotation=fit.rotations[0] @ np.diag([1.0, -1.0, -1.0]),
+        )  # fmt: skip
+        off.append((lean(found, here) - lean(truth, here)) / fit.tilt_sd)
+    assert 0.5 < np.sqrt(np.mean(np.square(off))) < 1.5
+
+
+def test_a_scale_alone_was_taken_by_eye(tmp_path):
+    path = tmp_path / "calibration.json"
+    write_calibration(scale_calibration(mm_per_px=0.1, image_size_px=(90, 80)), path)
+    kept = read_calibration(path).tilt_sd_deg
+    assert kept > 0.1
+    data = json.loads(path.read_text())
+    del data["tilt_sd_deg"]  # as files of before have it
+    path.write_text(json.dumps(data))
+    assert read_calibration(path).tilt_sd_deg == kept
+
+
 LENS = {
     "focal_px": 1200.0, "height_mm": 118.0, "size_px": (800, 600),
     "distortion": (-0.18, 0.04, 4e-4, -3e-4, 0.0),

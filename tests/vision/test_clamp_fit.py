@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from magbend.vision import Pose, as_photo, extract
+from magbend.vision.curve.curve import Curve
 from magbend.vision.edge.clamp import ClampLines
 from magbend.vision.edge.crossings import EndFace
 from magbend.vision.extraction.clamp_fit import APART, joint
@@ -24,6 +26,7 @@ from magbend.vision.synthetic import (
 
 NO_FRONT = 0.0, np.inf
 SEEN = 60.0
+LINE = EndFace(0.0, 0.02, 0.0, 0.05, 1.0, 0.3, 1.0)
 ANGLE = 4.0
 CAMERA = scene_camera(
     size_px=(900, 720), focal_px=1000.0, height_mm=56.0, tilt_deg=11.0,
@@ -90,6 +93,40 @@ def test_an_end_on_the_rod_that_no_front_checks_is_doubted_more():
 
     assert place(None).s == place(end).s == 0.0
     assert place(None).sd > 2.0 * place(end).sd
+
+
+def straight_rod(face, front):
+    s = np.linspace(0.0, 300.0, 31)
+    points = np.column_stack([400.0 + s, np.full(31, 350.0)])
+    curve = Curve(s=s, points=points, theta=np.zeros(31), kappa=np.zeros(31))
+    return SimpleNamespace(
+        clamp=ClampLines(face=face, front=front), blur=1.0, typical_width=20.0,
+        tip=SimpleNamespace(blur=1.0), fit=SimpleNamespace(curve=curve),
+    )  # fmt: skip
+
+
+def test_a_line_at_another_height_is_known_no_better_than_the_camera_s_tilt():
+    """The clamp's front on the paper, 3 mm below the axis, at 20 px/mm."""
+    ends = SimpleNamespace(rise_along=np.zeros(2), along=np.full(2, 20.0))
+
+    def sd(height_mm, tilt_sd_deg):
+        camera = replace(CAMERA, tilt_sd_deg=tilt_sd_deg)
+        setting = Setting(calibration=camera, rod_height_mm=height_mm)
+        return root_place(straight_rod(None, LINE), ends, setting, 0.5).sd
+
+    assert sd(0.0, 0.5) == sd(0.0, 0.0)
+    more = np.sqrt(sd(3.0, 0.5) ** 2 - sd(3.0, 0.0) ** 2)
+    assert more == pytest.approx(np.radians(0.5) * 3.0 * 20.0)
+
+
+def test_what_hides_a_root_without_a_front_may_be_the_face_of_a_chuck():
+    """Then the rod ends where it is seen to, not where a top as high would hide it."""
+    ends = SimpleNamespace(rise_along=np.full(2, 3.0), along=np.full(2, 20.0))
+    setting = Setting(calibration=CAMERA, rod_height_mm=3.0, clamp_height_mm=5.0)
+    boxed = root_place(straight_rod(LINE, LINE), ends, setting, 0.5)
+    alone = root_place(straight_rod(LINE, None), ends, setting, 0.5)
+    assert alone.s == boxed.s != 0.0
+    assert boxed.sd < 0.1 < 0.5 * abs(alone.s) < alone.sd
 
 
 def photographed(shape, *, skew_deg=0.0):

@@ -11,6 +11,7 @@ is OpenCV's here (y down, z into the board).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import cv2
@@ -78,6 +79,8 @@ class Bundle:
         Standard deviation of a corner in x or y.
     distance_relative_sd, scale_relative_sd : float
         Of the first view's distance, and of its mm per pixel at the principal point.
+    tilt_sd : float
+        Of the angle at which its plane is seen there, in any direction, rad.
     """
 
     focal_px: float
@@ -89,6 +92,7 @@ class Bundle:
     sigma_px: float
     distance_relative_sd: float
     scale_relative_sd: float
+    tilt_sd: float
 
 
 def default_prior(
@@ -264,18 +268,44 @@ def _prior_rows(unknowns: Array, prior: Prior) -> tuple[Array, Array]:
 
 def _distance(unknowns: Array) -> tuple[float, Array]:
     """Return the camera's height above the first view's plane, and its derivatives."""
+    height = float(_camera_mm(unknowns[LENS : LENS + 6])[2])
+    return height, _by_pose(unknowns, _camera_mm)[2]
 
-    def height(pose: Array) -> float:
-        rotation, _ = cv2.Rodrigues(pose[:3])
-        return float(np.asarray(rotation)[:, 2] @ pose[3:])
 
+def _by_pose(unknowns: Array, of_pose: Callable[[Array], Array]) -> Array:
+    """Return the derivatives of numbers that hang on the first view's pose."""
     pose = unknowns[LENS : LENS + 6]
-    gradient = np.zeros(len(unknowns))
+    columns = []
     for i in range(6):
         step = np.zeros(6)
         step[i] = 1e-6 * max(1.0, abs(pose[i]))
-        gradient[LENS + i] = (height(pose + step) - height(pose - step)) / (2 * step[i])
-    return height(pose), gradient
+        columns.append((of_pose(pose + step) - of_pose(pose - step)) / (2.0 * step[i]))
+    gradient = np.zeros((len(columns[0]), len(unknowns)))
+    gradient[:, LENS : LENS + 6] = np.column_stack(columns)
+    return gradient
+
+
+def _camera_mm(pose: Array) -> Array:
+    """Return where the camera is, z counted up from the board."""
+    rotation = np.asarray(cv2.Rodrigues(pose[:3])[0])
+    return np.asarray((rotation.T @ pose[3:]) * [-1.0, -1.0, 1.0])
+
+
+def _by_tilt(unknowns: Array) -> Array:
+    """Return the derivatives of how the camera sees what stands on the board lean.
+
+    By height, where its axis meets the first view's plane, along x and y.
+    """
+    pose = unknowns[LENS : LENS + 6]
+    axis = np.asarray(cv2.Rodrigues(pose[:3])[0])[2]
+    camera = _camera_mm(pose)
+    target = camera[:2] + camera[2] / axis[2] * axis[:2]
+
+    def lean(pose: Array) -> Array:
+        x, y, height = _camera_mm(pose)
+        return np.asarray((np.array([x, y]) - target) / height)
+
+    return _by_pose(unknowns, lean)
 
 
 def _sigma(unknowns: Array, views: list[Corners], radius: float) -> float:
@@ -307,6 +337,7 @@ def _report(
         sigma_px=sigma,
         distance_relative_sd=_sd(by_log_distance, covariance),
         scale_relative_sd=_sd(by_log_scale, covariance),
+        tilt_sd=max(_sd(row, covariance) for row in _by_tilt(unknowns)),
     )
 
 

@@ -172,6 +172,7 @@ def _calibration(
         camera_height_sd_mm=0.0,
         camera_height_source=source,
         scale_relative_sd=bundle.scale_relative_sd,
+        tilt_sd_deg=math.degrees(bundle.tilt_sd),
         rms_px=views[0].rms_px,
         rod_height_mm=rod_height_mm,
         print_scale=board.print_scale,

@@ -25,6 +25,9 @@ from .projection import Camera, points_to_picture, points_to_plane
 
 Array = NDArray[np.float64]
 
+STRAIGHT_SD_DEG = 0.3
+"""How squarely a camera looks down on a plane of which no board was seen: it is set up
+by eye, or with a level."""
 NO_PARALLAX = "unknown: no correction for height"
 """Source of the camera height where none is known; the view counts as parallel."""
 
@@ -66,6 +69,9 @@ class Calibration:
         corners alone; the print scale comes on top.
     rms_px : float
         RMS distance of the corners of the plane photograph from the model.
+    tilt_sd_deg : float
+        Standard deviation of the angle at which the plane is seen: what stands above it
+        leans by so much to any side. 0 where a file of before does not tell.
     rod_height_mm : float
         Height of the rod's axis above the board's plane, taken when none is given.
     print_scale : float
@@ -88,6 +94,7 @@ class Calibration:
     camera_height_source: str
     scale_relative_sd: float
     rms_px: float
+    tilt_sd_deg: float = 0.0
     rod_height_mm: float = 0.0
     print_scale: float = 1.0
     board: str = ""
@@ -215,6 +222,7 @@ def scale_calibration(
     camera_height_mm: float | None = None,
     scale_relative_sd: float = float("nan"),
     rod_height_mm: float = 0.0,
+    tilt_sd_deg: float = STRAIGHT_SD_DEG,
     source: str = "a scale given by hand",
 ) -> Calibration:
     """Return a calibration from nothing but a scale: no tilt, no lens, no board.
@@ -231,6 +239,8 @@ def scale_calibration(
         Relative standard deviation of the scale.
     rod_height_mm : float
         Height of the rod's axis above that plane.
+    tilt_sd_deg : float
+        How squarely the camera looks down on it, as a standard deviation.
     source : str
         Where the scale comes from, in words.
 
@@ -257,6 +267,7 @@ def scale_calibration(
         camera_height_source=NO_PARALLAX if far else "given",
         scale_relative_sd=scale_relative_sd,
         rms_px=float("nan"),
+        tilt_sd_deg=tilt_sd_deg,
         rod_height_mm=rod_height_mm,
         board=source,
     )

@@ -13,7 +13,7 @@ from pydantic import Field
 from ...core.errors import ConfigError, InputError
 from ...core.json import write_json
 from ...core.toml import FileModel, read_toml
-from .calibration import Calibration, View
+from .calibration import STRAIGHT_SD_DEG, Calibration, View
 from .clamp_tag import ClampTag
 
 Pair = tuple[float, float]
@@ -62,6 +62,7 @@ class CalibrationModel(FileModel):
     tilt_deg: float
     scale_relative_sd: float | None
     rms_px: float | None
+    tilt_sd_deg: float | None = None
     rod_height_mm: float = 0.0
     print_scale: float = 1.0
     board: str = ""
@@ -86,6 +87,7 @@ def write_calibration(calibration: Calibration, path: Path) -> None:
         "tilt_deg": calibration.tilt_deg,
         "scale_relative_sd": calibration.scale_relative_sd,
         "rms_px": calibration.rms_px,
+        "tilt_sd_deg": calibration.tilt_sd_deg,
         "rod_height_mm": calibration.rod_height_mm,
         "print_scale": calibration.print_scale,
         "board": calibration.board,
@@ -130,6 +132,7 @@ def _calibration(model: CalibrationModel) -> Calibration:
         camera_height_source=model.camera_height_source,
         scale_relative_sd=_or(model.scale_relative_sd, math.nan),
         rms_px=_or(model.rms_px, math.nan),
+        tilt_sd_deg=_or(model.tilt_sd_deg, _untold_tilt_sd_deg(model)),
         rod_height_mm=model.rod_height_mm,
         print_scale=model.print_scale,
         board=model.board,
@@ -150,6 +153,11 @@ def _calibration(model: CalibrationModel) -> Calibration:
             else ClampTag(**model.clamp_tag.model_dump())
         ),
     )
+
+
+def _untold_tilt_sd_deg(model: CalibrationModel) -> float:
+    """Return what a file of before knew of its tilt: nothing if it saw no board."""
+    return STRAIGHT_SD_DEG if model.rms_px is None else 0.0
 
 
 def _or(value: float | None, missing: float) -> float:

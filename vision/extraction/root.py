@@ -37,7 +37,9 @@ ROUND, ROUND_CARRIED = 0.3, 0.7
 """How far the front of a chuck, a disc, bulges toward the tip where it is seen aslant,
 over what as much height as the rod is wide is shifted (0.3 for a disc eight times as
 wide as the rod, more for a smaller one); and the doubt of how far its rim is carried
-to the height of the axis, of which it may be anything up to the radius away."""
+to the height of the axis, of which it may be anything up to the radius away. So may a
+clamp of which no front is seen beside the rod be a chuck, on whose face the rod ends
+where it seems to."""
 
 _STEP_PX = 20.0
 """Length over which lines are taken for straight."""
@@ -92,17 +94,21 @@ def root_place(
     face, front = refined.clamp.face, refined.clamp.front
     shifted = abs(rise) / float(ends.along[0]) * refined.typical_width
     is_round = front is not None and front.bulge > ROUND * shifted
+    axis_mm = setting.axis_height_mm
     share = ROUND_CARRIED if is_round else CARRIED
     if rise > 0.0:
+        share = share if front is not None else ROUND_CARRIED
         hidden = hidden_px(refined, setting, rise) / math.sqrt(3.0)
         place, line = _hidden_root(refined, ends, setting), front or face
         carried = 0.0 if line is None else place - line.s
-        sd = _sd(refined, line, share * carried, hidden)
+        top = setting.clamp_height_mm
+        leant = 0.0 if top is None else _leant(ends, setting, top - axis_mm)
+        sd = _sd(refined, line, share * carried, leant, hidden)
         return RootPlace(s=place, sd=sd, hidden=hidden)
     if is_round and face is not None:
         # Its rim is at no height that is known; the rod's own lanes are.
         front, share = None, CARRIED
-    seen_at, axis_mm = [], setting.axis_height_mm
+    seen_at = []
     if face is not None:
         seen_at.append(_below(refined, face, axis_mm + rim_mm, setting))
     if front is not None:
@@ -112,16 +118,29 @@ def root_place(
     if face is None or front is None:
         line = front or face
         carried = 0.0 if line is None else seen_at[0] - line.s
-        return RootPlace(s=seen_at[0], sd=_sd(refined, line, share * carried))
+        leant = _leant(ends, setting, axis_mm if face is None else rim_mm)
+        return RootPlace(s=seen_at[0], sd=_sd(refined, line, share * carried, leant))
     apart, carried = seen_at[1] - seen_at[0], seen_at[1] - front.s
     if abs(apart) <= APART_PX:
         place = between(seen_at[0], seen_at[1], refined.clamp)
         clear = max(face, front, key=lambda line: line.rise)
-        sd = _sd(refined, clear, CARRIED * carried, BETWEEN * apart)
+        leant = _leant(ends, setting, between(rim_mm, -axis_mm, refined.clamp))
+        sd = _sd(refined, clear, CARRIED * carried, leant, BETWEEN * apart)
         return RootPlace(s=place, sd=sd, apart=apart)
     if is_face(apart, setting.face_px(refined.fit.curve)):
-        return RootPlace(s=seen_at[1], sd=_sd(refined, front, CARRIED * carried))
+        leant = _leant(ends, setting, axis_mm)
+        return RootPlace(s=seen_at[1], sd=_sd(refined, front, CARRIED * carried, leant))
     return RootPlace(s=seen_at[0], sd=0.5 * abs(apart), apart=apart)
+
+
+def _leant(ends: LocalView, setting: Setting, above_mm: float) -> float:
+    """Return the doubt of where a line so far above the axis is carried to it, px.
+
+    The camera's tilt, as well as it is known, moves it by so much to any side.
+    """
+    camera = setting.calibration
+    tilt = 0.0 if camera is None else math.radians(camera.tilt_sd_deg)
+    return tilt * abs(above_mm) * float(ends.along[0])
 
 
 def _sd(refined: Refined, line: EndFace | None, *doubts: float) -> float:

@@ -237,6 +237,7 @@ def draw(
     calibration = scale_calibration(
         mm_per_px=1.0 / positive(px_per_mm, "px_per_mm", "px/mm"),
         image_size_px=size_px,
+        tilt_sd_deg=0.0,
         source="exact",
     )
     if clamp_px is None or angle_deg is None:
