@@ -50,7 +50,6 @@ $(VENV)/.created:
 $(VENV)/.ready: $(VENV)/.created pyproject.toml constraints.txt
 	@echo "installing magbend and its pinned dependencies into $(VENV) (once, about a minute)"
 	$(PIP) --constraint constraints.txt --editable .
-	$(BIN)/python -m magbend.analysis.warm_up
 	touch $@
 
 $(VENV)/.ready-test: $(VENV)/.created pyproject.toml constraints.txt

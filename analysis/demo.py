@@ -6,16 +6,20 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..core.errors import StoreError
+from ..core.jit import once
 from ..core.owned import owning_folder
 from ..rig import is_bench, read_plan, write_templates
 from .compare.compare import compare_run, write_comparison
 from .fit.runs import try_fit
-from .report import write_report
+from .report import ReportFiles, write_report
 from .runs.load import load_run
 from .twin.run import calibrate_twin, measure_twin, run_on_twin
-from .warm_up import is_warm, warm_up
+from .warm_up import is_warm, warm_up_beside
 
 Tell = Callable[[str], None]
+
+PATIENCE = 5_000_000
+"""Calls of kernels that fit and report may take in plain Python: some minutes."""
 
 
 def run_demo(out: Path, *, seed: int, tell: Tell) -> Path:
@@ -51,9 +55,7 @@ def _run(out: Path, *, seed: int, tell: Tell) -> Path:
     if not (out / "plan.toml").exists():
         write_templates(out, twin=True)
     plan = read_plan(out / "plan.toml")
-    if not is_warm():
-        tell("kernels  compiling the numerical kernels, once; a few minutes")
-        warm_up()
+    cold = not is_warm()
     folder = _free_name(out)
     gaps = ", ".join(f"{gap_mm:g}" for gap_mm in plan.gaps_mm)
     tell(f"bench    {plan.specimen.name} on the twin bench, hidden truth {seed}")
@@ -63,7 +65,11 @@ def _run(out: Path, *, seed: int, tell: Tell) -> Path:
     tell(f"camera   calibrated on its board, {calibration.rms_px:.3f} px RMS")
     measured = measure_twin(bench, folder, calibration)
     tell(f"vision   {measured} of {summary.steps_done} photographs measured")
-    return _report(folder, tell=tell)
+    report = _report(folder, cold=cold, tell=tell)
+    if cold:
+        tell("kernels  compiling in the background, once, for a few minutes")
+        warm_up_beside()
+    return report
 
 
 def _free_name(out: Path) -> Path:
@@ -76,7 +82,7 @@ def _free_name(out: Path) -> Path:
     )
 
 
-def _report(folder: Path, *, tell: Tell) -> Path:
+def _report(folder: Path, *, cold: bool, tell: Tell) -> Path:
     data = load_run(folder)
     compared = compare_run(data)
     write_comparison(folder / "comparison.csv", [compared])
@@ -87,7 +93,12 @@ def _report(folder: Path, *, tell: Tell) -> Path:
                 f"sim      {model} field: {sum(rms_mm) / len(rms_mm):.3f} mm RMS "
                 f"between measured and predicted shapes"
             )
-    fit = try_fit(data, compared.support)
-    files = write_report([compared], folder / "report.html", fits=[fit])
+
+    def judged() -> ReportFiles:
+        fit = try_fit(data, compared.support)
+        return write_report([compared], folder / "report.html", fits=[fit])
+
+    # Their kernels take longer to compile than three steps do in plain Python.
+    files = once(judged, patience=PATIENCE) if cold else judged()
     tell(f"report   one page and {len(files.figures)} figures")
     return files.html

@@ -2,12 +2,13 @@
 
 Numba compiles a kernel when it is first called and keeps the result. A first command
 would wait for that, one kernel after another; ``python -m magbend.analysis.warm_up``
-(and `make demo`) does it beforehand.
+(and `magbend demo`, once it has shown its report) does it beforehand.
 """
 
 from __future__ import annotations
 
 import multiprocessing
+import subprocess
 import sys
 from collections.abc import Callable
 
@@ -29,12 +30,21 @@ def is_warm() -> bool:
 
 
 def warm_up() -> None:
-    """Compile everything that `magbend demo` calls, in two processes."""
+    """Compile what photographs, solves and fits call, in two processes."""
     context = multiprocessing.get_context("spawn")
     with context.Pool(2) as pool:
         jobs = (_photograph, _curve, _rod, _solid)
         for result in [pool.apply_async(job) for job in jobs]:
             result.get()
+
+
+def warm_up_beside() -> None:
+    """Compile in a process that goes on when this one has ended."""
+    quiet = subprocess.DEVNULL
+    subprocess.Popen(
+        [sys.executable, "-m", "magbend.analysis.warm_up"],
+        stdin=quiet, stdout=quiet, stderr=quiet, start_new_session=True,
+    )  # fmt: skip
 
 
 def _rod() -> None:

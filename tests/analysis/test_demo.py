@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from magbend.analysis import demo, warm_up
+from magbend.core import jit
 from magbend.core.errors import RigError, StoreError
 from magbend.sim.planar.solver import solve_rows
 from magbend.vision.batch import cold
@@ -39,6 +41,39 @@ def test_a_second_demo_gets_the_next_free_name(
         with pytest.raises(RigError, match="enough"):
             demo.run_demo(tmp_path / "demo", seed=2, tell=quiet)
     assert asked == ["run_001", "run_002"]
+
+
+@pytest.mark.parametrize("warm", [True, False])
+def test_a_cold_demo_shows_its_report_and_then_has_kernels_compiled(
+    warm: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+
+    def in_plain_python(name: str) -> None:
+        assert (jit._calls_left.get() is None) is warm
+        told.append(name)
+
+    step = SimpleNamespace(support=None, of=lambda _model: [])
+    files = SimpleNamespace(html=tmp_path / "report.html", figures=())
+    done = SimpleNamespace(steps_done=3, rms_px=0.1)
+    replaced = {
+        "is_warm": lambda: warm,
+        "warm_up_beside": lambda: told.append("compile"),
+        "run_on_twin": lambda *_, **__: (None, done),
+        "calibrate_twin": lambda *_: done,
+        "measure_twin": lambda *_: 3,
+        "load_run": lambda _: None,
+        "compare_run": lambda _: step,
+        "write_comparison": lambda *_: None,
+        "try_fit": lambda *_: in_plain_python("fit"),
+        "write_report": lambda *_, **__: in_plain_python("page") or files,
+    }
+    for name, stand_in in replaced.items():
+        monkeypatch.setattr(demo, name, stand_in)
+    demo.run_demo(tmp_path / "demo", seed=2, tell=lambda line: told.append(line[:6]))
+    shown = told.index("report")
+    assert told[shown - 2 : shown] == ["fit", "page"]
+    assert told[shown + 1 :] == ([] if warm else ["kernel", "compile"])
 
 
 def test_nothing_is_called_warm_that_photographs_find_cold(
