@@ -81,6 +81,18 @@ def test_a_rod_is_held_where_what_lies_beside_it_changes(rod, clamp, without):
         assert max(aside) < 0.2 * WIDTH
 
 
+def test_a_clamp_nearly_of_the_papers_colour_holds_a_rod():
+    nearly = tuple(
+        level * share for level, share in zip(PAPER, (1.15, 1.0, 0.86), strict=True)
+    )
+    photo, axis = scene(rod=BLACK, clamp=nearly)
+    whole = held(photo, part(axis))
+    assert np.hypot(*(whole.points_px[0] - ROOT)) < 0.2 * WIDTH
+    found = extract(photo, None)
+    assert found.ok
+    assert np.hypot(*(np.array(found.clamp_px) - ROOT)) < 0.1 * WIDTH
+
+
 def test_a_grey_picture_tells_as_well():
     photo, axis = scene(rod=BLACK, clamp=WHITE)
     found = held(as_photo(np.asarray(photo.decode())[..., 1].copy()), part(axis))

@@ -10,6 +10,7 @@ there, alike; at a free end paper goes on, or the rod's shade on one side.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,11 +60,11 @@ _DEEPEST, _COLOURLESS = 1.5, 0.3
 """Darkest shade, as a logarithm, and how far the steps of its colours may lie apart, as
 a share of their mean."""
 
-_FRONT, _SURE, _NOISE = 0.25, 2.0, 0.01
-"""Change beside the rod at a front, as a logarithm, and over the scatter of what is
-before it; and what that is at least."""
+_FRONT, _SURE, _NOISE, _CLEARER = 0.15, 1.4, 0.01, 2.0
+"""Change beside the rod at a front, as a logarithm, over the scatter of what is before
+it, which is so much at least, and over the change at the other end."""
 
-_ALIKE, _APART = 0.8, 0.3
+_ALIKE, _APART = 0.7, 0.3
 """Cosine of the changes on both sides, as steps of blue, green and red; or how far what
 lies behind may be apart there, as a share of the lesser change."""
 
@@ -92,6 +93,9 @@ def as_held(photo: Photo, rod: Candidate) -> Candidate:
 def held(photo: Photo, rod: Candidate) -> Candidate | None:
     """Return a rod that seems to float as held at that end at which a front is seen.
 
+    What changes at its free end is little beside that, even where grain and the lines
+    of squared paper scatter both.
+
     Parameters
     ----------
     photo : Photo
@@ -106,42 +110,54 @@ def held(photo: Photo, rod: Candidate) -> Candidate | None:
         at both.
     """
     _, points, _ = resample(rod.points_px, 0.6 * rod.width_px)
-    ways = [from_front(photo, way, rod.width_px) for way in (points, points[::-1])]
-    found = [way for way in ways if way is not None]
-    if len(found) != 1:
+    root, tip = (_end_at(photo, way, rod.width_px) for way in (points, points[::-1]))
+    if root.is_front == tip.is_front:
         return None
+    front, free = (root, tip) if root.is_front else (tip, root)
+    if front.change < _CLEARER * free.change:
+        return None
+    points = front.points
     return replace(
-        rod, points_px=found[0], length_px=float(arc_lengths(found[0])[-1]),
+        rod, points_px=points, length_px=float(arc_lengths(points)[-1]),
         root="clamp", contacts=1, leaves=False, from_front=True,
     )  # fmt: skip
 
 
-def from_front(photo: Photo, points: Array, width: float) -> Array | None:
-    """Return the points of a rod from the front of a clamp on, at which they begin.
+class _End(NamedTuple):
+    """What is seen where a rod is lost: its points from there on, and what changes.
 
-    Parameters
-    ----------
-    photo : Photo
-        The photograph.
-    points : ndarray, shape (n, 2)
-        Points on the axis, px, from the end that is looked at.
-    width : float
-        Width of the rod, px.
-
-    Returns
-    -------
-    ndarray, shape (m, 2), or None
-        None where no front is seen there.
+    The change beside it as a logarithm, and over the scatter of what is before, each of
+    the lesser side; whether it is one body that begins there; and whether what ends may
+    be a shade.
     """
+
+    points: Array
+    change: float = 0.0
+    sure: float = 0.0
+    one_body: bool = False
+    is_shade: bool = False
+
+    @property
+    def is_front(self) -> bool:
+        """Whether it is the front of a clamp."""
+        clear = self.change > _FRONT and self.sure > _SURE
+        return clear and self.one_body and not self.is_shade
+
+
+def _end_at(photo: Photo, points: Array, width: float) -> _End:
+    """Return what is seen where a rod is lost, from the end that is looked at on."""
     s = arc_lengths(points)
     step = _own_step(photo, points, s, width)
-    if not step.any() or _may_be_shade(step):
-        return None
+    if not step.any():
+        return _End(points)
     low = _known(s, width)[0]
     recent = np.linspace(low, low + _STEP * width * _RECENT, _RECENT, endpoint=False)
     way = _followed(photo, on_polyline(recent, s, points), step, width)
-    front = _front(photo, way, step, width)
-    return None if front is None else np.vstack([front, points[s > recent[-1]]])
+    end = _lost(photo, way, step, width)
+    return end._replace(
+        points=np.vstack([end.points, points[s > recent[-1]]]),
+        is_shade=_may_be_shade(step),
+    )
 
 
 def seen_behind(photo: Photo, points: Array, width: float) -> bool:
@@ -218,29 +234,28 @@ def _followed(photo: Photo, way: Array, rise: Array, width: float) -> Array:
     return np.vstack([way[0] + far[:, None] * ahead, way])
 
 
-def _front(photo: Photo, way: Array, rise: Array, width: float) -> Array | None:
-    """Return a way from the front of a clamp on, where there is one across it."""
+def _lost(photo: Photo, way: Array, rise: Array, width: float) -> _End:
+    """Return what is seen where a rod is lost on its way."""
     s = arc_lengths(way)
     u = np.arange(s[-1], 0.0, -1.0)  # outwards
     way = on_polyline(u, s, way)
     light = _across(photo, way, width)
     lost = max(_GONE * width, _GONE_PX)
     ends = [_lost_at(share > _SEEN, round(lost)) for share in _shares(light, rise)]
+    points = way[: round(0.5 * (ends[0] + ends[1])) + 1][::-1]
     near, far = _NEAR * width + _NEAR_PX, _FAR * width + _FAR_PX
-    papers, bodies = np.empty((2, 2, light.shape[2]))
+    papers, bodies, scatter = np.empty((3, 2, light.shape[2]))
     for k, (end, side) in enumerate(zip(ends, light[1:], strict=True)):
         before = side[max(round(end - far), 0) : max(round(end - near), 0)]
         behind = side[round(end + near) : round(end + far)]
         if min(len(before), len(behind)) < 2:
-            return None
+            return _End(points)
         papers[k], bodies[k] = np.median(before, axis=0), np.median(behind, axis=0)
-        scatter = 1.4826 * np.median(np.abs(before - papers[k]), axis=0) + _NOISE
-        least = max(_FRONT, _SURE * float(np.linalg.norm(scatter)))
-        if np.linalg.norm(bodies[k] - papers[k]) < least:
-            return None
-    if not _is_one_body(papers, bodies):
-        return None
-    return way[: round(0.5 * (ends[0] + ends[1])) + 1][::-1]
+        scatter[k] = 1.4826 * np.median(np.abs(before - papers[k]), axis=0) + _NOISE
+    changes = np.linalg.norm(bodies - papers, axis=1)
+    sure = changes / np.linalg.norm(scatter, axis=1)
+    one_body = _is_one_body(papers, bodies)
+    return _End(points, float(changes.min()), float(sure.min()), one_body)
 
 
 def _is_one_body(papers: Array, bodies: Array) -> bool:
