@@ -26,6 +26,7 @@ from magbend.vision.camera.calibration_file import (
     read_calibration,
     write_calibration,
 )
+from magbend.vision.camera.projection import local_view
 from magbend.vision.measurement import Pose
 from magbend.vision.picture.photo import Photo, as_photo, read_photo
 from magbend.vision.synthetic import render_board, scene_camera
@@ -98,6 +99,31 @@ def test_agrees_with_opencv_projection():
     )
     ours = camera.to_px(points, height_mm=2.0)
     np.testing.assert_allclose(ours, theirs.reshape(-1, 2), atol=1e-8)
+
+
+def test_a_curve_is_seen_as_its_points_move_by_a_pixel_and_by_a_millimetre():
+    camera = scene_camera(
+        tilt_deg=18.0, turn_deg=20.0, distortion=(-0.2, 0.05, 1e-3, 2e-3, 0.01),
+        focal_px=1800.0, height_mm=90.0,
+    )  # fmt: skip
+    points, theta = grid()[::7], np.linspace(-3.0, 9.0, len(grid()[::7]))
+    seen = local_view(camera.camera, points, theta, 2.0)
+    along = np.column_stack([np.cos(theta), np.sin(theta)])
+    right = np.column_stack([-along[:, 1], along[:, 0]])
+    at = camera.to_mm(points, height_mm=2.0)
+    ahead, aside = (
+        camera.to_mm(points + 0.5 * by, height_mm=2.0)
+        - camera.to_mm(points - 0.5 * by, height_mm=2.0)
+        for by in (along, right)
+    )
+    risen = camera.to_px(at, height_mm=2.5) - camera.to_px(at, height_mm=1.5)
+    np.testing.assert_allclose(np.column_stack(seen[:2]), at, atol=1e-10)
+    apart = seen.heading - np.arctan2(ahead[:, 1], ahead[:, 0])
+    np.testing.assert_allclose(np.sin(apart), 0.0, atol=1e-7)
+    np.testing.assert_allclose(seen.along, 1.0 / np.hypot(*ahead.T), rtol=1e-6)
+    np.testing.assert_allclose(seen.across, 1.0 / np.hypot(*aside.T), rtol=1e-6)
+    np.testing.assert_allclose(seen.rise_along, np.sum(risen * along, axis=1))
+    np.testing.assert_allclose(seen.rise_across, np.sum(risen * right, axis=1))
 
 
 def test_frame_has_y_to_the_left_of_x_in_the_picture():

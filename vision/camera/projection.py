@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 _STEPS = 200
 _STILL = 1e-13
+_NEAR_MM = 0.05
+"""How far to either side a plane is looked at for its scale: a pixel or so."""
 
 
 class Camera(NamedTuple):
@@ -89,21 +91,22 @@ def local_view(camera: Camera, points: Array, theta: Array, height: float) -> Lo
         x, y = points[i, 0], points[i, 1]
         u, v = np.cos(theta[i]), np.sin(theta[i])
         at_x, at_y = _to_plane(camera, x, y, height)
-        behind = _to_plane(camera, x - u, y - v, height)
-        ahead = _to_plane(camera, x + u, y + v, height)
-        left = _to_plane(camera, x + v, y - u, height)
-        right = _to_plane(camera, x - v, y + u, height)
-        high = _to_picture(camera, at_x, at_y, height + 0.5)
-        low = _to_picture(camera, at_x, at_y, height - 0.5)
-        step_x, step_y = ahead[0] - behind[0], ahead[1] - behind[1]
-        rise_x, rise_y = high[0] - low[0], high[1] - low[1]
+        by_x = _shift(camera, at_x, at_y, height, (_NEAR_MM, 0.0, 0.0))
+        by_y = _shift(camera, at_x, at_y, height, (0.0, _NEAR_MM, 0.0))
+        rise_x, rise_y = _shift(camera, at_x, at_y, height, (0.0, 0.0, 0.5))
+        # The inverse of these: mm that a pixel along the curve, and to its right, is.
+        area = by_x[0] * by_y[1] - by_y[0] * by_x[1]
+        step_x = (by_y[1] * u - by_y[0] * v) / area
+        step_y = (by_x[0] * v - by_x[1] * u) / area
+        right_x = -(by_y[1] * v + by_y[0] * u) / area
+        right_y = (by_x[0] * u + by_x[1] * v) / area
         out[0, i], out[1, i] = at_x, at_y
         out[2, i] = np.arctan2(step_y, step_x)
         if i > 0:
             turns = round((out[2, i] - out[2, i - 1]) / (2.0 * np.pi))
             out[2, i] -= 2.0 * np.pi * turns
-        out[3, i] = 2.0 / np.hypot(step_x, step_y)
-        out[4, i] = 2.0 / np.hypot(right[0] - left[0], right[1] - left[1])
+        out[3, i] = 1.0 / np.hypot(step_x, step_y)
+        out[4, i] = 1.0 / np.hypot(right_x, right_y)
         out[5, i] = rise_x * u + rise_y * v
         out[6, i] = rise_y * u - rise_x * v
     return LocalView(out[0], out[1], out[2], out[3], out[4], out[5], out[6])
@@ -136,6 +139,18 @@ def _to_picture(
     ahead = turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * height + shift[2]
     u, v = _distorted(lens, right / ahead, down / ahead)
     return u * lens[0] + lens[2], v * lens[1] + lens[3]
+
+
+@njit(cache=True, error_model="numpy")
+def _shift(
+    camera: Camera, x: float, y: float, z: float, by: tuple[float, float, float]
+) -> tuple[float, float]:
+    """Return by how much a point's pixel shifts for 1 mm along an axis of the board."""
+    u, v, w = by
+    ahead = _to_picture(camera, x + u, y + v, z + w)
+    behind = _to_picture(camera, x - u, y - v, z - w)
+    size = 2.0 * (u + v + w)
+    return (ahead[0] - behind[0]) / size, (ahead[1] - behind[1]) / size
 
 
 @njit(cache=True)

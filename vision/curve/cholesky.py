@@ -18,16 +18,26 @@ Array = NDArray[np.float64]
 def factor(matrix: Array) -> Array:
     """Return the upper triangular U with U^T U = matrix; NaN if there is none."""
     size = len(matrix)
-    u = matrix.copy()
+    u, buffer = np.zeros_like(matrix), np.empty(size)
     for k in range(size):
-        pivot = np.sqrt(u[k, k]) if u[k, k] > 0.0 else np.nan
-        for i in range(k, size):
-            u[k, i] /= pivot
-        for j in range(k + 1, size):
-            share = u[k, j]
-            u[j, k] = 0.0
-            for i in range(j, size):
-                u[j, i] -= share * u[k, i]
+        row, m = buffer[k:], 0
+        for i in range(row.size):
+            row[i] = matrix[k, k + i]
+        while m + 4 <= k:  # four rows at once: the sum is loaded and stored for all
+            one, two, three, four = u[m, k:], u[m + 1, k:], u[m + 2, k:], u[m + 3, k:]
+            a, b, c, d = one[0], two[0], three[0], four[0]
+            for i in range(row.size):
+                rest = row[i] - a * one[i] - b * two[i]
+                row[i] = rest - c * three[i] - d * four[i]
+            m += 4
+        while m < k:
+            share = u[m, k]
+            for i in range(row.size):
+                row[i] -= share * u[m, k + i]
+            m += 1
+        pivot = np.sqrt(row[0]) if row[0] > 0.0 else np.nan
+        for i in range(row.size):
+            u[k, k + i] = row[i] / pivot
     return u
 
 

@@ -205,8 +205,9 @@ def _told_blur(front: EndFace | None, optics: Sequence[float]) -> tuple[float, f
     told = [*optics, front.blur] if front is not None and front.blur else [*optics]
     if not told:
         return 0.0, math.inf
-    middle = median(np.array(told))
-    return middle, math.hypot(_LENS * middle, float(np.std(told)))
+    middle, mean = median(np.array(told)), sum(told) / len(told)
+    apart = math.hypot(*(blur - mean for blur in told)) / math.sqrt(len(told))
+    return middle, math.hypot(_LENS * middle, apart)
 
 
 @njit(cache=True)

@@ -218,7 +218,7 @@ def _fit_step(
     return place, skew, blur, rise, known, off, uneven
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _solve(
     equations: Array, weight: Array, rise: Array, blur: float,
     optics: tuple[float, float], step: Array,
@@ -227,21 +227,41 @@ def _solve(
     total, left = np.zeros((3, 4)), 0.0
     for g in range(weight.size):
         scale = weight[g] * rise[g]
-        total[:, :3] += scale * rise[g] * equations[g, :3, :3]
-        total[:, 3] += scale * equations[g, :3, 3]
+        for a in range(3):
+            for b in range(3):
+                total[a, b] += scale * rise[g] * equations[g, a, b]
+            total[a, 3] += scale * equations[g, a, 3]
         left += weight[g] * equations[g, 3, 3]
-    if not (np.isfinite(np.sum(total)) and np.linalg.det(total[:, :3]) > 0.0):
+    if not np.isfinite(np.sum(total)):
         return False
-    step[:] = np.linalg.solve(total[:, :3].copy(), total[:, 3].copy())
-    left -= float(np.sum(step * total[:, 3]))
+    right = total[:, 3].copy()
+    for p in range(3):
+        if not total[p, p] > 0.0:
+            return False
+        for a in range(p + 1, 3):
+            part = total[a, p] / total[p, p]
+            for b in range(p, 4):
+                total[a, b] -= part * total[p, b]
+    _substitute(total, step)
+    left -= float(np.sum(step * right))
     sure = _ALIKE * max(left, 0.0) / optics[1] ** 2
     total[2, 2] += sure
     total[2, 3] += sure * (optics[0] - blur)
-    step[:] = np.linalg.solve(total[:, :3].copy(), total[:, 3].copy())
+    _substitute(total, step)
     return True
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
+def _substitute(total: Array, step: Array) -> None:
+    """Fill in the step that solves equations, (3, 4), of which a triangle is left."""
+    for p in range(2, -1, -1):
+        rest = total[p, 3]
+        for a in range(p + 1, 3):
+            rest -= total[p, a] * step[a]
+        step[p] = rest / total[p, p]
+
+
+@njit(cache=True, error_model="numpy")
 def _fill(
     light: Array, s: Array, across: Array, place: float, skew: float, blur: float,
     inner: float, outer: float, equations: Array, heights: Array,
@@ -252,27 +272,32 @@ def _fill(
     what is left; the levels, and the outer one's slope, are eliminated. The height is
     the last number less the other three times these.
     """
-    change, full = np.empty(7), np.zeros((7, 7))
+    changes, full = np.empty((7, s.size)), np.zeros((7, 7))
     for i in range(across.size):
         at = place + skew * across[i]
         first = max(int(np.ceil((at - inner - s[0]) / (s[1] - s[0]))), 0)
         last = min(int((at + outer - s[0]) / (s[1] - s[0])), s.size - 1)
+        count = 0
         for k in range(first, last + 1):
             if not np.isfinite(light[i, k]):
                 continue
             t = (s[k] - at) / blur
             outside = 0.5 * (1.0 + math.erf(t / math.sqrt(2.0)))
             bell = math.exp(-0.5 * t * t) / math.sqrt(2.0 * math.pi)
-            change[0] = 1.0 - outside
-            change[1] = outside
-            change[2] = t * outside + bell
-            change[3] = -bell / blur
-            change[4] = -bell / blur * across[i]
-            change[5] = -bell / blur * t
-            change[6] = light[i, k]
-            for a in range(7):
-                for b in range(a, 7):
-                    full[a, b] += change[a] * change[b]
+            changes[0, count] = 1.0 - outside
+            changes[1, count] = outside
+            changes[2, count] = t * outside + bell
+            changes[3, count] = -bell / blur
+            changes[4, count] = -bell / blur * across[i]
+            changes[5, count] = -bell / blur * t
+            changes[6, count] = light[i, k]
+            count += 1
+        for a in range(7):
+            for b in range(a, 7):
+                one, other, total = changes[a], changes[b], full[a, b]
+                for k in range(count):
+                    total += one[k] * other[k]
+                full[a, b] = total
         if len(equations) > 1 or i == across.size - 1:
             g = min(i, len(equations) - 1)
             _eliminate(full, heights[g])

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from ...core.errors import MagbendError
 from ..camera.oriented import oriented
-from ..curve.curve import Curve, arc_lengths
+from ..curve.curve import Curve
 from ..edge.state import BROKEN, LostError, Root
 from ..find.candidate import Candidate
 from ..find.ground import View, mixed
-from ..find.track import Start, start_curve
+from ..find.track import Start, resample, start_curve
 from ..measurement import Measurement
 from ..picture.photo import Photo
 from .bare import flattened
@@ -132,19 +132,15 @@ def _near(photo: Photo, setting: Setting, last: Measurement) -> Measurement | No
 
 def _expected(rod: Candidate) -> Start:
     """Return a start right where the rod is expected."""
-    s = arc_lengths(rod.points_px)
-    even = np.linspace(0.0, s[-1], len(s))
-    points = np.column_stack([np.interp(even, s, axis) for axis in rod.points_px.T])
-    step = np.gradient(points, axis=0)
-    theta = np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
-    line = Curve(s=even, points=points, theta=theta, kappa=np.gradient(theta, even[1]))
+    s, points, theta = resample(rod.points_px, 0.0)
+    line = Curve(s=s, points=points, theta=theta, kappa=np.gradient(theta, s[1]))
     return Start(curve=line, width=rod.width_px, rough=False, blur=1.0)
 
 
 def _turn(points: Array) -> float:
     """Return by how much a polyline turns in all, rad."""
-    steps = np.diff(points[::4], axis=0)
-    return float(np.ptp(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))))
+    _, _, theta = resample(points[::4], 0.0)
+    return float(np.ptp(theta))
 
 
 def _start(view: View, rod: Candidate, reach: float) -> Start | None:
