@@ -305,7 +305,7 @@ def refuse_outside(
             raise InputError(
                 "the rod leaves the box of the map of the field, from "
                 f"{source.low_mm.tolist()} to {source.high_mm.tolist()} mm: measure "
-                "farther out"
+                "farther out, or check the unit of its points"
             )
 
 

@@ -16,7 +16,15 @@ import numpy as np
 from ...core.centreline import Centreline
 from ...core.errors import InputError
 from ...core.units import unit_factor
-from .order import Indices, aligned, arc_length, chained_length, order_of, path_length
+from .order import (
+    Indices,
+    aligned,
+    arc_length,
+    chained_length,
+    order_of,
+    path_length,
+    root_direction,
+)
 from .shapes import Array, RawShape
 
 LENGTH_TOLERANCE = 0.03
@@ -27,6 +35,9 @@ ORIGIN_TOLERANCE = 0.01
 
 DIRECTION_TOLERANCE_DEG = 6.0
 """Of the first direction from +x."""
+
+CUBIC_DEG = 0.02
+"""What the direction of a cubic at the root errs by on rods that bend strongly."""
 
 THETA_TOLERANCE_RAD = 0.03
 """Largest typical difference between a theta that is given and that of x and y."""
@@ -81,6 +92,9 @@ class Shape:
         File, and which shape in it.
     kept : dict of str to ndarray
         Columns of our own that stood beside points which were taken as they are.
+    direction_sd_deg : float
+        Of the direction that was turned to +x, from the scatter of the points; NaN
+        where none was.
     """
 
     line: Centreline
@@ -88,6 +102,7 @@ class Shape:
     notes: tuple[str, ...]
     source: str
     kept: dict[str, Array] = field(default_factory=dict)
+    direction_sd_deg: float = math.nan
 
 
 def judged(
@@ -124,18 +139,22 @@ def judged(
     if how.flip:
         points = points * np.array([1.0, -1.0])
         notes.append("flipped")
+    angle, angle_sd = root_direction(points)
     turn = 0.0
     if how.align:
-        points, turn = aligned(points)
+        points, turn, angle = aligned(points, angle), -angle, 0.0
         notes.append("aligned")
     _check_origin(raw, points)
     line = _line(raw, points, factor, how, turn, notes)
     _check_length(raw, line, how, length_mm)
-    _check_direction(raw, line)
+    _check_direction(raw, angle)
     _check_side(raw, line, side, how)
     return Shape(
         line=line, parameters=dict(raw.parameters), notes=tuple(notes),
         source=raw.source,
+        direction_sd_deg=(
+            math.hypot(math.degrees(angle_sd), CUBIC_DEG) if how.align else math.nan
+        ),
         kept=dict(raw.kept) if len(raw.points) == len(line.s_mm) else {},
     )  # fmt: skip
 
@@ -151,7 +170,7 @@ def _in_mm(
         )
     if float(np.abs(raw.points).max()) > REACH:
         raise InputError(f"{raw.source}: holds coordinates beyond {REACH:g}")
-    unit = how.unit or raw.unit
+    unit = how.unit or raw.unit or ("px" if how.mm_per_px is not None else "")
     if unit in ("px", "pixel", "pixels"):
         if how.mm_per_px is None:
             raise InputError(
@@ -173,9 +192,13 @@ def _in_mm(
         )
     length = chained_length(raw.points)
     if abs(length / length_mm - 1.0) > LENGTH_TOLERANCE:
+        hint = _unit_hint(length, length_mm) or (
+            "; add --unit, or --mm-per-px if these are pixels (about "
+            f"{length_mm / length:.2g} would fit)"
+        )
         raise InputError(
             f"{raw.source}: does not say its unit, and is {length:.4g} long; the "
-            f"specimen has {length_mm:g} mm{_unit_hint(length, length_mm)}"
+            f"specimen has {length_mm:g} mm{hint}"
         )
     notes.append("taken_as_mm")
     return raw.points, 1.0
@@ -310,8 +333,8 @@ def _check_length(
         )
 
 
-def _check_direction(raw: RawShape, line: Centreline) -> None:
-    root_deg = math.degrees(float(line.theta_rad[0]))
+def _check_direction(raw: RawShape, angle_rad: float) -> None:
+    root_deg = math.degrees(angle_rad)
     if abs(root_deg) > DIRECTION_TOLERANCE_DEG:
         raise InputError(
             f"{raw.source}: must leave the clamp along +x; instead it leaves it at "

@@ -92,15 +92,28 @@ def _chain(points: Array) -> Indices:
     return np.array(order, dtype=np.intp)
 
 
-def aligned(points: Array) -> tuple[Array, float]:
-    """Return the points from the clamp on, and how far they were turned, in rad."""
-    moved = points - points[0]
-    steps = np.hypot(*np.diff(points, axis=0).T)
+def root_direction(points: Array) -> tuple[float, float]:
+    """Return the direction in which points leave the clamp, and its deviation, in rad.
+
+    That of a cubic through the first third, steadier than one step; the deviation is
+    what the scatter of these points makes of it, NaN where they are too few to tell.
+    """
     n = max(3, len(points) // 3)
-    s = np.concatenate([[0.0], np.cumsum(steps)])[:n]
-    # The root tangent from a cubic over the first third, steadier than one step.
-    basis = np.column_stack([s, s**2, s**3][: n - 1])
-    slope = np.linalg.lstsq(basis, moved[:n], rcond=None)[0][0]
-    turn = -math.atan2(slope[1], slope[0])
-    c, sn = math.cos(turn), math.sin(turn)
-    return moved @ np.array([[c, sn], [-sn, c]]), turn
+    s = arc_length(points[:n])
+    basis = np.vander(s, min(4, n), increasing=True)
+    inverse = np.linalg.pinv(basis)
+    curve = inverse @ points[:n]
+    angle = math.atan2(curve[1, 1], curve[1, 0])
+    spare = n - basis.shape[1]
+    if spare < 1:
+        return angle, math.nan
+    apart = (points[:n] - basis @ curve) @ [-math.sin(angle), math.cos(angle)]
+    scatter = math.sqrt(float(apart @ apart) / spare)
+    slope = float(np.hypot(*curve[1]))
+    return angle, scatter * float(np.linalg.norm(inverse[1])) / slope
+
+
+def aligned(points: Array, angle: float) -> Array:
+    """Return the points from the clamp on, turned back by `angle` in rad."""
+    c, sn = math.cos(angle), math.sin(angle)
+    return (points - points[0]) @ np.array([[c, -sn], [sn, c]])

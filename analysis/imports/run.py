@@ -349,6 +349,7 @@ def _write_measured(
             image=images[index], status="ok", flags=("imported", *shape.notes),
             length_mm=line.length_mm, tip_mm=line.tip_mm,
             tip_angle_deg=line.tip_angle_deg,
+            clamp_angle_sd_deg=shape.direction_sd_deg,
             width_mm=float(np.median(known)) if len(known) else math.nan,
         )  # fmt: skip
         nothing = np.full(len(line.s_mm), math.nan)

@@ -101,7 +101,8 @@ ALIASES = {
     "arclength": "s", "theta": "theta", "angle": "theta", "kappa": "kappa",
     "curvature": "kappa",
 }  # fmt: skip
-"""Names that programs give to the quantities of a shape; X and Y are the undeformed."""
+"""Names that programs give to the quantities of a shape; X and Y are the undeformed,
+unless they stand alone."""
 
 QUANTITIES = ("x", "y", "s", "theta", "kappa", "u", "v", "X", "Y")
 KEPT = (
@@ -171,6 +172,9 @@ def _of_case(
     lengths: list[str] = [name for name in ("x", "y", "s") if name in at]
     if x is None or y is None:
         x, y, lengths = _displaced(numbers)
+    if x is None and material is not None and not {"x", "y", "u", "v"} & set(at):
+        x, y, lengths = _alone(material, numbers("Y"))
+        material = None
     if x is None or y is None:
         names = ", ".join(head for head, _ in block.columns[:8]) or "no heads"
         raise ConfigError(
@@ -234,6 +238,15 @@ def _displaced(
         return None, None, []
     second = numbers("Y")
     return first + u, (v if second is None else second + v), ["u", "v", "X"]
+
+
+def _alone(
+    first: Array, second: Array | None
+) -> tuple[Array | None, Array | None, list[str]]:
+    """Return X and Y as the points, as ImageJ heads them; not an undeformed rod's."""
+    if second is None or not np.ptp(second):
+        return None, None, []
+    return first, second, ["X", "Y"]
 
 
 def _common_unit(

@@ -48,7 +48,7 @@ class FieldMap:
     ----------
     points_mm : array_like, shape (n, 3)
         Where, in the specimen frame, in mm: a grid or any scatter. All at z = 0 mean
-        that the field is symmetric about the plane, and Bz must be zero.
+        that the field is symmetric about the plane; what Bz is read there is noise.
     flux_mT : array_like, shape (n, 3)
         Bx, By, Bz there.
     tolerance_mT : float, optional
@@ -82,25 +82,28 @@ class FieldMap:
 
     def __post_init__(self) -> None:
         points, flux = _checked(self.points_mm, self.flux_mT)
-        rms = float(np.sqrt(np.mean(flux**2)))
-        allowed = 0.02 * rms
+        allowed = 0.02 * _rms(flux)
         if self.tolerance_mT is not None:
             allowed = within(self.tolerance_mT, 0.0, 1e6, "map tolerance_mT", "mT")
         flat = not np.any(points[:, 2])
+        if flat:
+            _check_upright(flux, allowed)
         places = _places(points, flat=flat)
         rows = _rows(places, points, flat=flat)
         kept = np.repeat(_kept(points), 3)
         between, cut = _best_cut(rows, flux.ravel(), kept)
         fits = _fits(rows, flux.ravel())
-        closest = _rms(rows @ fits[CUTS[-1]] - flux.ravel())
+        apart = (rows @ fits[CUTS[-1]] - flux.ravel()).reshape(-1, 3)
+        closest = _rms(apart)
         residual = _rms(rows @ fits[cut] - flux.ravel())
         charges = np.column_stack([places, fits[cut]])
         if closest > allowed:
             raise InputError(
                 "flux_mT of a map must be a field without curl and divergence, to "
                 f"within tolerance_mT {allowed:.3g} mT; instead received readings from "
-                f"which every such field differs by {closest:.3g} mT (RMS): check the "
-                "axes of the probe and of the points, or measure closer together"
+                f"which every such field differs by {closest:.3g} mT (RMS; most at "
+                f"{_farthest(points, apart)} mm): check the axes of the probe and of "
+                "the points, or measure closer together"
             )
         if between > 3.0 * allowed:
             raise InputError(
@@ -206,15 +209,26 @@ def _checked(points_mm: ArrayLike, flux_mT: ArrayLike) -> tuple[Array, Array]:
             f"rectangle at z = 0; instead received {len(points)} that span "
             f"{np.ptp(points, axis=0).round(6).tolist()} mm"
         )
-    if flat and np.any(flux[:, 2] != 0.0):
-        raise InputError(
-            "Bz_mT of a map with all points at z = 0 must be 0, as the field is taken "
-            "to be symmetric about the plane; instead received "
-            f"{np.abs(flux[:, 2]).max():g} mT: write 0 there if this is the probe's "
-            "noise, or add readings off the plane"
-        )
     within(float(np.abs(flux).max()), 0.0, FLUX_LIMIT_T * 1e3, "map flux_mT", "mT")
     return points, flux
+
+
+def _check_upright(flux: Array, allowed: float) -> None:
+    """Refuse readings in the plane alone whose Bz is more than noise."""
+    upright = _rms(flux[:, 2])
+    if upright > allowed:
+        raise InputError(
+            "Bz_mT of a map with all points at z = 0 must be 0 to within tolerance_mT "
+            f"{allowed:.3g} mT, as the field is taken to be symmetric about the plane; "
+            f"instead received {upright:.3g} mT (RMS): add readings off the plane, or "
+            "mend the probe's zero or tilt"
+        )
+
+
+def _farthest(points: Array, apart: Array) -> tuple[float, ...]:
+    """Return where readings are farthest from a field."""
+    at = int(np.argmax(np.sum(apart**2, axis=1)))
+    return tuple(float(f"{value:.6g}") for value in points[at])
 
 
 def _places(points: Array, *, flat: bool) -> Array:

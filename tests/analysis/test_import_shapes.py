@@ -128,6 +128,11 @@ RIGHT: dict[str, tuple[str, str, Reading, str]] = {
     "digitiser": ("s.csv", text(XY, "x, y"), Reading(unit="mm"), ""),
     "pixels": (
         "s.csv", text(XY * [20, -20], "x_px,y_px"), Reading(mm_per_px=0.05), ""),
+    "pixels without a head": (
+        "s.txt", text(XY * [20, -20], sep="\t"), Reading(mm_per_px=0.05), ""),
+    "imagej results": (
+        "s.csv", " ,X,Y\n" + text(columns(np.arange(1, 62), XY * [20, -20])),
+        Reading(mm_per_px=0.05), ""),
     "edges in pixels": (
         "s.csv", "side,point,x_px,y_px\n" + SIDES, Reading(mm_per_px=0.05), "edges"),
     "comsol text": ("s.txt", comsol("mm", 1.0), Reading(), ""),
@@ -189,6 +194,10 @@ REFUSED: dict[str, tuple[str, str, str]] = {
         "does not agree"),
     "pixels without a scale": (
         "s.csv", text(XY * [20, -20], "x_px,y_px"), "add --mm-per-px"),
+    "pixels that say nothing": (
+        "s.txt", text(XY * [20, -20], sep="\t"), r"--mm-per-px .* \(about 0.05 would"),
+    "an undeformed rod": (
+        "s.csv", text(columns(LINE.s_mm, 0.0 * LINE.s_mm), "X,Y"), "columns x and y"),
     "x and y in two units": (
         "s.csv", text(XY, "x_mm,y_m"), "in one unit"),
     "s in another unit": (
@@ -340,6 +349,28 @@ def test_what_a_file_brings_is_kept_to_the_last_digit(tmp_path: Path) -> None:
         np.testing.assert_allclose(
             getattr(found.line, name), getattr(LINE, name), rtol=1e-12, atol=1e-12
         )
+
+
+def test_clicked_points_are_aligned_as_well_as_is_said(tmp_path: Path) -> None:
+    """Each 0.3 px off, of 0.05 mm: the ends of a spline then point anywhere."""
+    rng = np.random.default_rng(7)
+    clicked, at = LINE.s_mm[::2], tmp_path / "s.csv"
+    xy = columns(*(np.interp(clicked, LINE.s_mm, c) for c in (LINE.x_mm, LINE.y_mm)))
+    turned, told = [], []
+
+    def outer(line: Centreline) -> float:
+        half = len(line.s_mm) // 2
+        dx, dy = line.x_mm[-1] - line.x_mm[half], line.y_mm[-1] - line.y_mm[half]
+        return math.atan2(dy, dx)
+
+    for _ in range(40):
+        at.write_text(text((xy + rng.normal(scale=0.015, size=xy.shape)) @ TURN, "x,y"))
+        (found,) = read_shapes(
+            at, Reading(unit="mm", align=True), length_mm=LENGTH_MM, side=1.0
+        )
+        turned.append(math.degrees(outer(found.line) - outer(LINE)))
+        told.append(found.direction_sd_deg)
+    assert 0.7 < np.std(turned) / math.sqrt(np.mean(np.square(told))) < 1.4
 
 
 def test_a_missing_file_and_a_folder_are_one_sentence(tmp_path: Path) -> None:

@@ -324,12 +324,25 @@ def test_a_flat_map_keeps_the_plane() -> None:
     x, y = np.meshgrid(np.arange(-2.0, 35.0, 2.0), np.arange(-10.0, 11.0, 2.0))
     grid = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
     readings = flux_mT(magnet, grid, length_mm=30.0)
-    readings[:, 2] = 0.0
+    readings[:, 2] = np.random.default_rng(6).normal(scale=0.05, size=len(grid))
     field = Field(FieldMap(points_mm=grid, flux_mT=readings))
     assert field.in_plane
     true = solve(gmc(2), magnet).centreline.tip_mm
     assert math.dist(true, solve(gmc(2), field).centreline.tip_mm) < 1e-3
     sensitivities(gmc(2), field, parameters=["E_MPa[0]"])
+    with pytest.raises(InputError, match=r"Bz_mT .* instead received 3.* mT \(RMS\)"):
+        FieldMap(points_mm=grid, flux_mT=readings + np.eye(3)[2] * 3.0)
+
+
+def test_a_reading_of_the_wrong_sign_is_pointed_at() -> None:
+    magnet = Cuboid(sides_mm=55.0, remanence_T=1.305, gap_mm=60.0)
+    edges = [np.arange(a, b + 1.0, 6.0) for a, b in BOX.T]
+    grid = np.stack(np.meshgrid(*edges, indexing="ij"), axis=-1).reshape(-1, 3)
+    readings = flux_mT(magnet, grid, length_mm=30.0)
+    at = int(np.flatnonzero(np.all(grid == [10.0, 0.0, 0.0], axis=1))[0])
+    readings[at] *= -1.0
+    with pytest.raises(InputError, match=r"most at \(10.0, 0.0, 0.0\) mm"):
+        FieldMap(points_mm=grid, flux_mT=readings)
 
 
 def test_a_map_whose_lengths_are_headed_in_another_unit_is_refused(
