@@ -116,4 +116,4 @@ def root_direction(points: Array) -> tuple[float, float]:
 def aligned(points: Array, angle: float) -> Array:
     """Return the points from the clamp on, turned back by `angle` in rad."""
     c, sn = math.cos(angle), math.sin(angle)
-    return (points - points[0]) @ np.array([[c, -sn], [sn, c]])
+    return np.asarray((points - points[0]) @ np.array([[c, -sn], [sn, c]]))
