@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,13 @@ VIEW = ("frame_angle_deg", "scale_percent", "clamp_position_mm")
 CURVATURE = "natural_curvature_per_mm"
 CURVATURE_STEP = 1e-4
 """1/mm, of the difference that gives the effect of a natural curvature."""
+
+OF_ROD = {
+    "E_MPa", "length_mm", "joint_mm", "section_length_mm", "side_percent",
+    "remanence_mT", "remanence_percent", "remanence_profile_percent",
+    "density_percent", "stiffness_gradient",
+}  # fmt: skip
+"""What changes the rod itself; of each section where it has a number in brackets."""
 
 PARTS = 4
 """Pieces of a section whose stiffness changes gradually."""
@@ -154,6 +162,13 @@ def stated(datum: Datum, values: Values) -> float:
 
 def rod_of(nominal: Specimen, values: Values) -> Specimen:
     """Return the rod with all that the unknowns change of it."""
+    own = [item for item in values.items() if item[0].partition("[")[0] in OF_ROD]
+    return _changed(nominal, tuple(own))
+
+
+@lru_cache(maxsize=64)  # most derivatives, and all photographs, share their rods
+def _changed(nominal: Specimen, changes: tuple[tuple[str, float], ...]) -> Specimen:
+    values = dict(changes)
     count = len(nominal.sections)
     ends = np.cumsum([section.length_mm for section in nominal.sections])
     middles = ends - 0.5 * np.diff(ends, prepend=0.0)
