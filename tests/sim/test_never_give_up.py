@@ -175,7 +175,12 @@ def drawn(name: str) -> tuple[Rod, MagnetField]:
     return rod, MagnetField(magnet=OFF_ITS_PLANE, gap_mm=one["gap_mm"])
 
 
-@pytest.mark.parametrize("name", DRAWN)
+# The first takes 40 s of CPU alone and as long in a batch.
+FIRST, *OTHERS = DRAWN
+NAMES = [pytest.param(FIRST, marks=pytest.mark.slow), *OTHERS]
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_a_rod_drawn_out_of_its_plane_is_followed_all_the_way(name: str) -> None:
     rod, field = drawn(name)
     check = check_spatial(rod, field, support=HELD)
@@ -185,10 +190,7 @@ def test_a_rod_drawn_out_of_its_plane_is_followed_all_the_way(name: str) -> None
     assert np.abs(check.at(found.s_mm) - found.r_mm).max() < found.error_mm < 1e-3
 
 
-FIRST, *OTHERS = DRAWN
-
-
-@pytest.mark.parametrize("name", [pytest.param(FIRST, marks=pytest.mark.slow), *OTHERS])
+@pytest.mark.parametrize("name", NAMES)
 def test_a_batch_follows_such_a_rod_too(name: str) -> None:
     check = check_spatial(*drawn(name), support=HELD)
     columns = {key: [value] for key, value in DRAWN[name].items()}
