@@ -135,6 +135,20 @@ def test_a_swallowed_line_is_a_timeout_not_an_arrival():
     assert bench.stage.position_state == "unverified"
 
 
+def test_a_switch_that_closes_under_way_stops_a_board_without_hard_limits():
+    """8 mm of steps lost near the magnet: the far switch comes 8 mm too early."""
+    bench = homed_bench({1: 255, 20: 1, 21: 0, 22: 1, 130: 180})
+    bench.board.plant.lose(8.0)
+    bench.stage.goto_gap(60.0)
+    with pytest.raises(StageTimeoutError, match=r"switch of X closed .* lost steps"):
+        bench.stage.goto_gap(117.0)
+    assert bench.stage.position_state == "unverified"
+    # two reports at 5 mm/s, then the way that 10 mm/s2 takes to stop
+    assert 120.0 < bench.true_gap_mm < 120.5 + 2 * 0.5 + 1.25
+    with pytest.raises(PositionLostError):
+        bench.stage.goto_gap(50.0)
+
+
 def test_homing_that_finds_no_switch_is_alarm_9():
     bench = make_bench(
         {1: 255, 20: 1, 21: 1, 22: 1, 130: 5, 131: 5, 132: 5}, plant=Plant()

@@ -127,7 +127,10 @@ def notes(settings: Settings, config: StageConfig) -> list[str]:
     if not number(settings, "20"):
         found.append("$20 (soft limits) is off; limits are checked by the host alone")
     if not number(settings, "21"):
-        found.append("$21 (hard limits) is off; the switches stop nothing but homing")
+        found.append(
+            "$21 (hard limits) is off: a switch that closes on the way is seen by the "
+            "host alone, a few tenths of a second late"
+        )
     steps = number(settings, f"{100 + _AXES.index(config.axis)}") or 0.0
     rate_Hz = steps * config.feed_mm_min / 60.0
     if rate_Hz > _MAX_STEPS_HZ:

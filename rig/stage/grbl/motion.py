@@ -19,6 +19,8 @@ POLL_S = 0.1
 _STALL_S = 1.5
 _ASTRAY_MM = 0.2
 _SILENCE_S = 8.0
+_CLOSED = 2
+"""Reports in a row that call a switch closed: one may be noise."""
 _STANDING = ("idle", "alarm", "check", "sleep")
 
 
@@ -33,13 +35,17 @@ def stands(report: Report) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Target:
-    """From where to where an axis moves, how exactly, and how long it may take."""
+    """From where to where an axis moves, how exactly, and how long it may take.
+
+    `switch` is the letter of its limit switch, empty if that was closed at the start.
+    """
 
     axis: int
     start_mm: float
     machine_mm: float
     tolerance_mm: float
     limit_s: float
+    switch: str = ""
 
     def is_astray(self, here_mm: float) -> bool:
         """Return whether a place is not on the way: a digit of the line was lost."""
@@ -75,10 +81,12 @@ def await_arrival(
     PositionLostError
         It restarted.
     StageTimeoutError
-        It stopped short, went elsewhere, fell silent, or took longer than it may.
+        It stopped short, went elsewhere, fell silent, took longer than it may, or its
+        limit switch closed: a board with $21=0 drives on into it.
     """
     start_s = heard_s = progress_s = clock.monotonic_s()
     last: float | None = None
+    closed = 0
     while True:
         check_stop()
         report = session.ask()
@@ -90,8 +98,15 @@ def await_arrival(
         if report and machine and len(machine) > target.axis:
             heard_s, here = now_s, machine[target.axis]
             moved(here)
+            is_closed = target.switch != "" and target.switch in report.pins
+            closed = closed + 1 if is_closed else 0
+            if closed == _CLOSED:
+                raise StageTimeoutError(
+                    f"the limit switch of {target.switch} closed at {here:.3f} mm, "
+                    "where the board counts free way: it has lost steps"
+                )
             at_target = abs(here - target.machine_mm) <= target.tolerance_mm
-            if report.state == "idle" and at_target:
+            if report.state == "idle" and at_target and not is_closed:
                 return
             if last is None or abs(here - last) > target.tolerance_mm:
                 last, progress_s = here, now_s

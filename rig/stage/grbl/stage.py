@@ -387,12 +387,14 @@ class GrblStage(SerialStage[GrblSession]):
         """Return where to, how exactly, and how long it may take."""
         start = self._machine_mm()
         distance = 0.0 if start is None else target_mm - start
+        letter, report = self._config.axis, self._require_session().report
         return Target(
             axis=self._axis,
             start_mm=target_mm - distance,
             machine_mm=target_mm,
             tolerance_mm=self.limits.tolerance_mm,
             limit_s=self._limit_s(distance, feed_mm_min),
+            switch="" if report and letter in report.pins else letter,
         )
 
     def _give_up(self, session: GrblSession, error: StageTimeoutError) -> NoReturn:
