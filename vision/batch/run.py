@@ -119,7 +119,7 @@ def extract_files(
             _measure_all(task, sources, state, workers, progress, resume=resume)
         finally:
             # After an interruption too: what is measured can be resumed.
-            state.write()
+            held = state.write()
             drawn = [out / "overlays" / source.overlay for source in sources]
             made = [*state.files, *(path for path in drawn if path.is_file())]
             seen = dict.fromkeys([*(s.path for s in sources), *made_with])
@@ -127,7 +127,7 @@ def extract_files(
                 made, sources=[path for path in seen if path.is_file()],
                 command="vision extract",
             )  # fmt: skip
-    frames = tuple(done.row for done in state.ready())
+    frames = tuple(done.row for done in held)
     if not any(frame.ok for frame in frames):
         first = frames[0]
         raise VisionError(

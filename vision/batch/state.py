@@ -51,14 +51,13 @@ class State:
             took = time.monotonic() - now
             self._next_write = now + max(_CHECKPOINT_S, 20.0 * took)
 
-    def ready(self) -> list[Done]:
-        """Return what the tables hold: the photographs of a run in one frame."""
-        held = [self.done[image] for image in self._order if image in self.done]
-        return in_run_frames(held, self._runs)
+    def write(self) -> list[Done]:
+        """Write all tables; the state goes last and names only what they hold.
 
-    def write(self) -> None:
-        """Write all tables; the state goes last and names only what they hold."""
-        ready = self.ready()
+        Return that: the photographs of a run in one frame.
+        """
+        held = [self.done[image] for image in self._order if image in self.done]
+        ready = in_run_frames(held, self._runs)
         write_text(self._out / "centrelines.csv", tables.write_centrelines(ready))
         frames = tables.write_frames(done.row for done in ready)
         write_text(self._out / "frames.csv", frames)
@@ -72,6 +71,7 @@ class State:
             "tables": {name: file_digest(self._out / name) for name in _TABLES},
         }
         write_json(self._out / STATE_FILE, state, indent=1)
+        return ready
 
     @property
     def files(self) -> list[Path]:

@@ -82,8 +82,8 @@ def binarise(grey: NDArray[np.float32], *, invert: bool | None = None) -> Binary
         invert = bool(high - middle > middle - low)
     if invert:
         work = np.float32(max(high, float(sample.max()))) - work
-    ratio = np.empty_like(work)
-    darker = _divide(work, *_background(work), ratio)
+    ratio = work.copy() if work is grey else work
+    darker = _divide(ratio, *_background(work))
     if darker.size < _LEAST_DARK // 4:
         return None
     (dark,) = _quantiles(darker, 0.1)
@@ -167,11 +167,13 @@ def _quantiles(values: NDArray[np.floating], *parts: float) -> list[float]:
 
 @njit(cache=True, error_model="numpy")
 def _divide(
-    work: NDArray[np.float32], c: NDArray[np.float32], floor: np.float32,
-    ratio: NDArray[np.float32],
-) -> NDArray[np.float32]:  # fmt: skip
-    """Divide by the quadric, which is at least `floor`; return each fourth dark one."""
-    height, width = work.shape
+    ratio: NDArray[np.float32], c: NDArray[np.float32], floor: np.float32
+) -> NDArray[np.float32]:
+    """Divide by the quadric, which is at least `floor`; return each fourth dark one.
+
+    In place: another picture would take its room in the cache.
+    """
+    height, width = ratio.shape
     x = np.linspace(-1.0, 1.0, width).astype(np.float32)
     y = np.linspace(-1.0, 1.0, height).astype(np.float32)
     darker = np.empty(((height + 1) // 2) * ((width + 1) // 2), np.float32)
@@ -181,7 +183,7 @@ def _divide(
         row = ratio[i]
         for j in range(width):
             light = level + x[j] * (slope + c[3] * x[j])
-            row[j] = work[i, j] / (light if light > floor else floor)
+            row[j] /= light if light > floor else floor
         if i % 2 == 0:
             for j in range(0, width, 2):
                 if row[j] < _NO_PAPER:

@@ -18,28 +18,35 @@ def opened(mask: Mask, radius: int) -> Mask:
     """Return a mask less whatever no disc of this radius inside it covers."""
     if radius > _SMALL:
         depth = np.asarray(cv2.distanceTransform(mask, cv2.DIST_L2, 5), np.float32)
-        return np.asarray(mask & near_core(depth, float(radius), float(radius)))
+        core = near_core(depth, np.flatnonzero(mask), float(radius), float(radius))
+        return np.asarray(mask & core)
     size = 2 * radius + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, disc), np.uint8)
 
 
 @njit(cache=True)
-def near_core(depth: NDArray[np.float32], core: float, reach: float) -> Mask:
-    """Mark what is within `reach` of where the depth exceeds `core`."""
+def near_core(
+    depth: NDArray[np.float32], places: NDArray[np.intp], core: float, reach: float
+) -> Mask:
+    """Mark what is within `reach` of where the depth exceeds `core`.
+
+    It is 0 but at places, given by rising flat indices.
+    """
     height, width = depth.shape
     near = np.zeros((height, width), np.uint8)
     rows = int(reach)
     aside = np.sqrt(reach**2 - np.arange(rows + 1) ** 2).astype(np.int64)
-    for i in range(height):
-        j = 0
-        while j < width:
-            first = j
-            while j < width and depth[i, j] > core:
-                j += 1
-            if j > first:
-                for k in range(max(i - rows, 0), min(i + rows + 1, height)):
-                    span = aside[abs(k - i)]
-                    near[k, max(first - span, 0) : j + span] = 1
-            j += 1
+    deep, n = depth.ravel(), 0
+    while n < places.size:
+        if not deep[places[n]] > core:
+            n += 1
+            continue
+        i = places[n] // width
+        first = last = places[n] - i * width
+        while last < width and deep[i * width + last] > core:
+            last, n = last + 1, n + 1
+        for k in range(max(i - rows, 0), min(i + rows + 1, height)):
+            span = aside[abs(k - i)]
+            near[k, max(first - span, 0) : last + span] = 1
     return near

@@ -126,10 +126,11 @@ def _fill(
 def _thin_parts(roi: Mask, origin: tuple[int, int], binary: Binary) -> list[Candidate]:
     """Return the thin parts of a thing: of the commonest width, or grown from that."""
     depth = _edge_distance(roi, origin, binary)
-    ridge = _ridge(depth)
+    places = np.flatnonzero(roi)
+    ridge = _ridge(depth, places)
 
     def of_width(half: float) -> list[Candidate]:
-        return _of_width(roi, depth, half, origin, binary) if half else []
+        return _of_width(roi, depth, places, half, origin, binary) if half else []
 
     common, thinner, thicker = _half_widths(ridge)
     found = of_width(common)
@@ -211,12 +212,12 @@ def _touches(one: Candidate, other: Candidate) -> bool:
 
 
 def _of_width(
-    roi: Mask, depth: NDArray[np.float32], half: float, origin: tuple[int, int],
-    binary: Binary,
+    roi: Mask, depth: NDArray[np.float32], places: NDArray[np.intp], half: float,
+    origin: tuple[int, int], binary: Binary,
 ) -> list[Candidate]:  # fmt: skip
     """Return the parts of a thing that are about `half` wide to either side."""
     reach = 1.5 * half + 1.0
-    fat = near_core(depth, reach, reach + 1.0)
+    fat = near_core(depth, places, reach, reach + 1.0)
     thin = (roi > fat).view(np.uint8)
     parts, _ = cv2.findContours(thin, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
     found = []
@@ -283,27 +284,23 @@ def _half_widths(ridge: NDArray[np.float32]) -> tuple[float, float, float]:
 
 
 @njit(cache=True)
-def _ridge(depth: NDArray[np.float32]) -> NDArray[np.float32]:
+def _ridge(depth: NDArray[np.float32], places: NDArray[np.intp]) -> NDArray[np.float32]:
     """Return the depths that no neighbour exceeds by more than 0.6.
 
-    The outermost pixels are a frame.
+    It is 0 but at places, given by flat indices; the outermost pixels are a frame.
     """
-    height, width = depth.shape
-    found = np.empty(height * width, dtype=np.float32)
+    deep, width = depth.ravel(), depth.shape[1]
+    found = np.empty(places.size, np.float32)
     count = 0
-    for i in range(1, height - 1):
-        above, row, below = depth[i - 1], depth[i], depth[i + 1]
-        for j in range(1, width - 1):
-            if row[j] < np.float32(0.9):
-                continue
-            most = row[j] + np.float32(0.6)
-            # One of the first four exceeds nearly every pixel that is none.
-            if (
-                row[j - 1] <= most and row[j + 1] <= most
-                and above[j] <= most and below[j] <= most
-                and above[j - 1] <= most and above[j + 1] <= most
-                and below[j - 1] <= most and below[j + 1] <= most
-            ):  # fmt: skip
-                found[count] = row[j]
-                count += 1
+    for p in places:
+        most = deep[p] + np.float32(0.6)
+        # One of the first four exceeds nearly every pixel that is none.
+        if (
+            deep[p - 1] <= most and deep[p + 1] <= most
+            and deep[p - width] <= most and deep[p + width] <= most
+            and deep[p - width - 1] <= most and deep[p - width + 1] <= most
+            and deep[p + width - 1] <= most and deep[p + width + 1] <= most
+        ):  # fmt: skip
+            found[count] = deep[p]
+            count += 1
     return found[:count]
