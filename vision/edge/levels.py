@@ -21,6 +21,8 @@ _ROOT_2PI = 2.5066282746310002
 _SLOPE_VARIANCE = 0.171
 """Variance, px^2, of the place whose slope the line through four samples tells: 0.9 of
 its weight is even over 1.5 px, and 0.1 over 0.5 px."""
+_MEAN_VARIANCE = 0.3125
+"""And of the places of these samples about their middle."""
 
 
 @njit(cache=True)
@@ -38,6 +40,32 @@ def level_spans(blur: float, fuzz: float) -> tuple[float, float, float]:
     """
     wide = max(math.hypot(blur, math.sqrt(_SLOPE_VARIANCE)), fuzz)
     return max(0.6, 1.1 * wide), clear_of(wide), max(4.0, 3.0 * wide)
+
+
+@njit(cache=True)
+def followed(blur: float, fuzz: float, half: float) -> float:
+    """Return what part of its way an edge is found to have moved, in one look.
+
+    It is sought by levels about the place where it is expected. If it lies farther out,
+    its blur reaches into these: what is found is short by their change, over the slope
+    of the edge. And the mean of four samples moves by less than their slope says.
+
+    Parameters
+    ----------
+    blur, fuzz, half : float
+        As for the edges: blur, reach of hairs, and half the width of the rod, px.
+    """
+    close, gap, window = level_spans(blur, fuzz)
+    before = max(int(min(gap + window, half) / STEP_PX + 0.5), 2)
+    columns = before + int((gap + window) / STEP_PX) + 1
+    inner, outer, rise = _level_filter(columns, before, close, window, blur, False)
+    pull = 0.0
+    for k in range(columns):
+        t = (k - before + 0.5) * STEP_PX / blur
+        level = 0.5 * (inner[k] + outer[k]) + rise[k] * blur / _ROOT_2PI
+        pull += level * math.exp(-0.5 * t * t)
+    slope = 1.0 / math.sqrt(1.0 + _SLOPE_VARIANCE / blur**2)
+    return (1.0 / math.sqrt(1.0 + _MEAN_VARIANCE / blur**2) - pull) / slope
 
 
 @njit(cache=True)

@@ -16,6 +16,7 @@ from ..curve.moment import weighed_fit
 from ..curve.problem import SHARED, pose
 from ..curve.robust import median
 from ..curve.spline import Smooth
+from ..edge.levels import followed
 from ..edge.state import LostError, Seen, State
 
 Array = NDArray[np.float64]
@@ -24,6 +25,9 @@ _BIN_PX = 4.0
 _BINS = 200
 """Stations are averaged over bins before the fit: so far, or so many on a long rod."""
 
+_WHOLE = 3
+"""Power of the arc length up to which a rod moves as a whole."""
+
 ROOT_CLEAR = 0.3
 """Widths next to the clamp that are left out of the fit."""
 
@@ -31,11 +35,12 @@ ROOT_CLEAR = 0.3
 def fit_midline(
     state: State, seen: Seen, first: float, last: float,
     joints: Callable[[Curve], Sequence[float]], known: Array | None, *, seeking: bool,
-    clamped: bool,
+    clamped: bool, foreseen: bool,
 ) -> tuple[CurveFit, NDArray[np.bool_], float, Array | None]:  # fmt: skip
     """Return the curve, points used, how far it moved, and joints as they were found.
 
-    `known` are the joints that a pass before found, from the root on.
+    `known` are the joints that a pass before found, from the root on; `foreseen` tells
+    that no pass was before, and none need be after: the curve is a film's forecast.
     """
     width = state.width
     if last - first < 4.0 * width:
@@ -53,6 +58,9 @@ def fit_midline(
     s, theta, measured, offset, within, weights = _binned(
         state.curve, seen.s, seen.edges.middle, use, first, last
     )
+    if foreseen:
+        more = _missed(state, s, offset, weights)
+        measured, offset = beside(measured, theta, more), offset + more
     # Supple while the rod is sought, then stiff enough not to follow shade; the path
     # of a rough rod (yarn) is no elastica, and stays supple.
     supple = seeking or state.rough or state.scatter > 0.03 * width
@@ -92,6 +100,20 @@ def fit_midline(
         float(aside),
         None if supple else places,
     )
+
+
+def _missed(state: State, s: Array, offset: Array, weights: Array) -> Array:
+    """Return by how much farther than it was found the midline lies, px.
+
+    Edges are held back where they were expected: that holds of what moved the rod as a
+    whole, not of what scatters about it. Once more after a pass, it would only make
+    more of the noise.
+    """
+    share = 1.0 / followed(state.blur, state.fuzz, 0.5 * state.width) - 1.0
+    rows = np.vander((s - s[0]) / (s[-1] - s[0]), _WHOLE + 1)
+    weighted = rows.T * weights
+    whole = np.linalg.solve(weighted @ rows, weighted @ offset)
+    return np.asarray(share * rows @ whole)
 
 
 @njit(cache=True)
