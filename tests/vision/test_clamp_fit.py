@@ -13,7 +13,7 @@ from magbend.vision.curve.curve import Curve
 from magbend.vision.edge.clamp import ClampLines
 from magbend.vision.edge.crossings import EndFace
 from magbend.vision.extraction.clamp_fit import APART, joint
-from magbend.vision.extraction.root import root_place
+from magbend.vision.extraction.root import root_place, together
 from magbend.vision.extraction.setting import Setting
 from magbend.vision.synthetic import (
     Block,
@@ -117,6 +117,19 @@ def test_a_line_at_another_height_is_known_no_better_than_the_camera_s_tilt():
     assert sd(0.0, 0.5) == sd(0.0, 0.0)
     more = np.sqrt(sd(3.0, 0.5) ** 2 - sd(3.0, 0.0) ** 2)
     assert more == pytest.approx(np.radians(0.5) * 3.0 * 20.0)
+
+
+def test_two_lines_under_one_tilt_tell_more_than_either():
+    """The higher leans to one side by as much as the lower to the other."""
+    tilt_sd, above = 0.01, np.array([30.0, -30.0])
+    seen = 0.3 * above / 30.0
+    lines = [(float(s), 0.05, float(h)) for s, h in zip(seen, above, strict=True)]
+    place, sd = together(lines, tilt_sd)
+    assert place == pytest.approx(0.0, abs=1e-9)
+    assert sd == pytest.approx(0.05 / np.sqrt(2.0))
+    assert together(lines[:1], tilt_sd)[1] == pytest.approx(np.hypot(0.05, 0.3))
+    # The same lines under a camera whose tilt is known contradict each other.
+    assert together(lines, 0.0)[1] == pytest.approx(0.3)
 
 
 def test_what_hides_a_root_without_a_front_may_be_the_face_of_a_chuck():

@@ -2,19 +2,23 @@
 
 The clamp's front plane is seen at the top of the rod (its face) and at the paper (its
 front line), if the camera looks at it; else only the clamp's top edge is. Each line is
-carried to the height of the axis. Where the two then disagree, one of them is of
-something else (a shade's border, a chamfer), and the place is known no better.
+carried to the height of the axis, and leans as the camera's tilt is in doubt. What both
+tell together is their least squares; where they disagree by more than they say, the
+place is known no better. If they do by far, one of them is of something else (a shade's
+border, a chamfer).
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ..camera.projection import LocalView
-from ..edge.clamp import between
+from ..edge.clamp import FACE_SEEN, FRONT_SEEN, doubt_px
 from ..edge.crossings import EndFace
 from ..edge.ends import APART_PX, is_face
 from .refine import Refined
@@ -23,11 +27,11 @@ from .setting import UNKNOWN_CLAMP_MM, Setting
 HIDDEN_MM = 0.05
 """What part of the root a clamp of unknown height may hide before that is named."""
 
-BORDER_PX, CARRIED, BETWEEN, SMEARED = 0.3, 0.002, 0.15, 0.8
+BORDER_PX, CARRIED, SMEARED = 0.3, 0.002, 0.8
 """Standard deviation of a place: px, of where a rod enters the picture; as shares of
-how far a line is carried to the height of the axis, of how far two lines are apart, and
-of what blurs a line more than the rod's sides and its tip: the front of a shade, seen
-as one line with the clamp's (errors of 0.1 to 1 times that on most drawings)."""
+how far a line is carried to the height of the axis, and of what blurs a line more than
+the rod's sides and its tip: the front of a shade, seen as one line with the clamp's
+(errors of 0.1 to 1 times that on most drawings)."""
 
 UNCHECKED = 2.5
 """And over that of the rod's end on its own lanes where no front is seen beside it: the
@@ -90,65 +94,98 @@ def root_place(
     """
     if refined.clamp is None:
         return RootPlace(s=0.0, sd=BORDER_PX)
-    rise = float(ends.rise_along[0])
+    rise, along = float(ends.rise_along[0]), float(ends.along[0])
     face, front = refined.clamp.face, refined.clamp.front
-    shifted = abs(rise) / float(ends.along[0]) * refined.typical_width
+    shifted = abs(rise) / along * refined.typical_width
     is_round = front is not None and front.bulge > ROUND * shifted
-    axis_mm = setting.axis_height_mm
-    share = ROUND_CARRIED if is_round else CARRIED
     if rise > 0.0:
-        share = share if front is not None else ROUND_CARRIED
-        hidden = hidden_px(refined, setting, rise) / math.sqrt(3.0)
-        place, line = _hidden_root(refined, ends, setting), front or face
-        carried = 0.0 if line is None else place - line.s
-        top = setting.clamp_height_mm
-        leant = 0.0 if top is None else _leant(ends, setting, top - axis_mm)
-        sd = _sd(refined, line, share * carried, leant, hidden)
-        return RootPlace(s=place, sd=sd, hidden=hidden)
-    if is_round and face is not None:
-        # Its rim is at no height that is known; the rod's own lanes are.
-        front, share = None, CARRIED
-    seen_at = []
+        # A clamp of which no front is seen may be a chuck, and end the rod on its face.
+        share = ROUND_CARRIED if is_round or front is None else CARRIED
+        return _hidden(refined, front or face, ends, setting, share)
+    readings, axis_mm = [], setting.axis_height_mm
     if face is not None:
-        seen_at.append(_below(refined, face, axis_mm + rim_mm, setting))
-    if front is not None:
-        seen_at.append(_below(refined, front, 0.0, setting))
-    if not seen_at:
+        at = _below(refined, face, axis_mm + rim_mm, setting)
+        readings.append(_Reading(at, _line_sd(refined, face), rim_mm * along))
+    # A disc's rim is at no height that is known; the rod's own lanes are.
+    if front is not None and not (is_round and face is not None):
+        at = _below(refined, front, 0.0, setting)
+        carried = (ROUND_CARRIED if is_round else CARRIED) * (at - front.s)
+        sd = _line_sd(refined, front, carried)
+        readings.append(_Reading(at, sd, -axis_mm * along))
+    if not readings:
         return RootPlace(s=0.0, sd=BORDER_PX)
-    if face is None or front is None:
-        line = front or face
-        carried = 0.0 if line is None else seen_at[0] - line.s
-        leant = _leant(ends, setting, axis_mm if face is None else rim_mm)
-        return RootPlace(s=seen_at[0], sd=_sd(refined, line, share * carried, leant))
-    apart, carried = seen_at[1] - seen_at[0], seen_at[1] - front.s
-    if abs(apart) <= APART_PX:
-        place = between(seen_at[0], seen_at[1], refined.clamp)
-        clear = max(face, front, key=lambda line: line.rise)
-        leant = _leant(ends, setting, between(rim_mm, -axis_mm, refined.clamp))
-        sd = _sd(refined, clear, CARRIED * carried, leant, BETWEEN * apart)
-        return RootPlace(s=place, sd=sd, apart=apart)
-    if is_face(apart, setting.face_px(refined.fit.curve)):
-        leant = _leant(ends, setting, axis_mm)
-        return RootPlace(s=seen_at[1], sd=_sd(refined, front, CARRIED * carried, leant))
-    return RootPlace(s=seen_at[0], sd=0.5 * abs(apart), apart=apart)
+    apart = readings[-1].s - readings[0].s
+    if abs(apart) > APART_PX:
+        if not is_face(apart, setting.face_px(refined.fit.curve)):
+            return RootPlace(s=readings[0].s, sd=0.5 * abs(apart), apart=apart)
+        readings, apart = readings[1:], 0.0
+    place, sd = together(readings, _tilt_sd(setting))
+    return RootPlace(s=place, sd=sd, apart=apart)
 
 
-def _leant(ends: LocalView, setting: Setting, above_mm: float) -> float:
-    """Return the doubt of where a line so far above the axis is carried to it, px.
+class _Reading(NamedTuple):
+    """Where a line puts the root and how surely, and how high above the axis it is, px.
 
-    The camera's tilt, as well as it is known, moves it by so much to any side.
+    That is how far it leans where the camera is tilted by one radian more.
     """
+
+    s: float
+    sd: float
+    above: float
+
+
+def together(readings: Sequence[_Reading], tilt_sd: float) -> tuple[float, float]:
+    """Return place and deviation by least squares of what lines tell under one tilt.
+
+    Parameters
+    ----------
+    readings : sequence of tuple
+        Place and deviation by each, and how high above the axis it lies, px.
+    tilt_sd : float
+        Standard deviation of the camera's tilt, rad.
+
+    Notes
+    -----
+    Where they differ by more than their deviations, these are too small by as much (the
+    Birge ratio; R. T. Birge, Phys. Rev. 40, 207, 1932).
+    """
+    s, sd, above = np.array(readings).T
+    sure = np.linalg.inv(np.diag(sd**2) + tilt_sd**2 * np.outer(above, above))
+    place = float(sure.sum(axis=0) @ s / sure.sum())
+    away = s - place
+    return place, math.sqrt(max(1.0, float(away @ sure @ away)) / float(sure.sum()))
+
+
+def _tilt_sd(setting: Setting) -> float:
     camera = setting.calibration
-    tilt = 0.0 if camera is None else math.radians(camera.tilt_sd_deg)
-    return tilt * abs(above_mm) * float(ends.along[0])
+    return 0.0 if camera is None else math.radians(camera.tilt_sd_deg)
 
 
-def _sd(refined: Refined, line: EndFace | None, *doubts: float) -> float:
-    """Return the deviation of a place that a line tells, with other doubts, px."""
+def _hidden(
+    refined: Refined, line: EndFace | None, ends: LocalView, setting: Setting,
+    share: float,
+) -> RootPlace:  # fmt: skip
+    """Return the root that a clamp's top hides, with the doubt of how far, a share."""
+    hidden = hidden_px(refined, setting, float(ends.rise_along[0])) / math.sqrt(3.0)
+    place = _hidden_root(refined, ends, setting)
     if line is None:
-        return math.hypot(*doubts)
-    lone = refined.clamp is not None and refined.clamp.front is None
-    own = (UNCHECKED if lone else 1.0) * line.place_sd
+        return RootPlace(s=place, sd=hidden, hidden=hidden)
+    top = setting.clamp_height_mm
+    above = 0.0 if top is None else top - setting.axis_height_mm
+    leant = _tilt_sd(setting) * above * float(ends.along[0])
+    sd = _line_sd(refined, line, share * (place - line.s), leant, hidden)
+    return RootPlace(s=place, sd=sd, hidden=hidden)
+
+
+def _line_sd(refined: Refined, line: EndFace, *doubts: float) -> float:
+    """Return the deviation of a place that a line tells, with other doubts, px."""
+    clamp = refined.clamp
+    if clamp is None or clamp.front is None:
+        own = UNCHECKED * line.place_sd
+    elif clamp.face is None:
+        own = line.place_sd
+    else:
+        own = doubt_px(line, FRONT_SEEN if line is clamp.front else FACE_SEEN)
     return math.hypot(own, SMEARED * smeared_px(refined, line.blur), *doubts)
 
 
