@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from magbend.vision import as_photo
+from magbend.vision.find import things
 from magbend.vision.find.binarise import binarise
 from magbend.vision.find.choose import likely_rods
 from magbend.vision.find.ground import ground_distance
@@ -115,3 +116,18 @@ def test_what_is_short_is_not_tried_before_a_rod_on_another_ground():
     is_stub = [rod.points_px[0, 0] > 800.0 for rod in found]
     is_rod = [rod.away(axis[100]) < 6.0 for rod in found]
     assert is_rod.index(True) < is_stub.index(True)
+
+
+def test_nothing_is_looked_for_or_tried_twice(monkeypatch):
+    looked = []
+
+    def counted(binary):
+        looked.append(binary)
+        return find_candidates(binary)
+
+    monkeypatch.setattr(things, "find_candidates", counted)
+    photo, _ = mat(rod=SKY, line=PALE)
+    found = list(likely_rods(photo, Sought()))
+    assert len({id(rod.points_px) for rod in found}) == len(found) > 0
+    levels = {(id(binary.ratio), binary.threshold) for binary in looked}
+    assert len(levels) == len(looked) > 0

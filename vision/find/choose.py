@@ -27,7 +27,7 @@ from .rod import LEAST_SHARE, find_candidates
 from .rod_colour import distance_from
 from .shadeless import shades
 from .sought import Sought
-from .things import Thing, find_things, without_strokes
+from .things import Levels, Thing, find_things, without_strokes
 from .two_colours import in_parts
 
 Array = NDArray[np.float64]
@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 _DARK = 0.25
 """Light of a rod, over the paper's, that no mix of colours tells much better."""
 
-_Finder = Callable[[Photo, Sought, Binary], Iterator[Candidate]]
+_Finder = Callable[[Photo, Sought, Levels], Iterator[Candidate]]
 
 _GROUNDS = 3
 """Grounds that things are told from, one after the other."""
@@ -92,18 +92,20 @@ def likely_rods(photo: Photo, sought: Sought) -> Iterator[Candidate]:
     LostError
         If another one is as likely, with the axes of what was seen.
     """
-    several, seen = None, False
-    for find, ground, unlined in _looks(photo):
+    several: LostError | None = None
+    seen: list[Array] = []
+    for find, picture, unlined in _looks(photo):
         if find is _short and several is not None:
             break
-        picture = ground
-        if seen and unlined is not None:
-            picture = beyond_lines(ground, unlined)  # a line is no rod either
+        if seen and unlined is not None:  # a line is no rod either
+            picture = Levels(beyond_lines(picture.binary, unlined))
         try:
             for rod in find(photo, sought, picture):
+                if any(rod.points_px is points for points in seen):
+                    continue
                 if rod.root == "clamp" or not seen:
-                    yield replace(rod, rivalled=rod.rivalled or seen)
-                seen = True
+                    yield replace(rod, rivalled=rod.rivalled or bool(seen))
+                seen.append(rod.points_px)
         except LostError as lost:
             if lost.flag == "two_rods":
                 raise
@@ -112,14 +114,14 @@ def likely_rods(photo: Photo, sought: Sought) -> Iterator[Candidate]:
         raise several
 
 
-def _looks(photo: Photo) -> Iterator[tuple[_Finder, Binary, Binary | None]]:
+def _looks(photo: Photo) -> Iterator[tuple[_Finder, Levels, Binary | None]]:
     """Yield what looks for rods, and where: a ground, and that without its lines."""
-    seen: list[tuple[Binary, Binary | None]] = []
+    seen: list[tuple[Levels, Binary | None]] = []
     for ground in _grounds(photo):
         unlined = without_lines(ground)
-        pictures = [(ground, unlined)]
+        pictures = [(Levels(ground), unlined)]
         if unlined is not None:
-            pictures.insert(0, (unlined, None))
+            pictures.insert(0, (Levels(unlined), None))
         for picture in pictures:
             yield _in_picture, *picture
         seen += pictures
@@ -139,10 +141,10 @@ def _grounds(photo: Photo) -> Iterator[Binary]:
         known.append(other)
 
 
-def _in_picture(photo: Photo, sought: Sought, binary: Binary) -> Iterator[Candidate]:
+def _in_picture(photo: Photo, sought: Sought, picture: Levels) -> Iterator[Candidate]:
     """Yield what may be the rod in one picture; else the next that a clamp holds."""
-    things = _things(photo, sought, binary, LEVELS, LEAST_LENGTH) or _things(
-        photo, sought, binary, FAINT, LEAST_LENGTH
+    things = _things(photo, sought, picture, LEVELS, LEAST_LENGTH) or _things(
+        photo, sought, picture, FAINT, LEAST_LENGTH
     )
     if things:
         rod = standing_out(_without_shades(photo, things), sought)
@@ -157,9 +159,9 @@ def _in_picture(photo: Photo, sought: Sought, binary: Binary) -> Iterator[Candid
         yield standing_out(_without_shades(photo, held), sought)
 
 
-def _short(photo: Photo, sought: Sought, binary: Binary) -> Iterator[Candidate]:
+def _short(photo: Photo, sought: Sought, picture: Levels) -> Iterator[Candidate]:
     """Yield what is short in one picture, and which a clamp holds."""
-    held = _held(_things(photo, sought, binary, LEVELS, LEAST_HELD))
+    held = _held(_things(photo, sought, picture, LEVELS, LEAST_HELD))
     if held:
         yield standing_out(_without_shades(photo, held), sought)
 
@@ -189,13 +191,14 @@ def seen_best(photo: Photo, sought: Sought, rod: Candidate) -> tuple[Candidate, 
 def _things(
     photo: Photo,
     sought: Sought,
-    binary: Binary,
-    levels: tuple[float, ...],
+    picture: Levels,
+    away: tuple[float, ...],
     least: float,
 ) -> list[Thing]:
     """Return what is long and thin, and about as was told, the likeliest first."""
+    binary = picture.binary
     least_px = least * binary.factor * float(np.hypot(*binary.mask.shape))
-    things = find_things(binary, [1.0 - level for level in levels], least_px)
+    things = find_things(picture, [1.0 - level for level in away], least_px)
     things = without_strokes(things)
     if sought.colour:
         _compare_colours(photo, sought.colour, things)

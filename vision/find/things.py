@@ -75,15 +75,36 @@ class Thing:
         return False
 
 
-def find_things(
-    binary: Binary, thresholds: Iterable[float], least_px: float
-) -> list[Thing]:
-    """Return the long thin things of a picture, the likeliest rod first.
+@dataclass(frozen=True, slots=True)
+class Levels:
+    """What is long and thin at each level of a picture, looked for once.
 
     Parameters
     ----------
     binary : Binary
         The picture; its `ratio` is below a threshold on things.
+    """
+
+    binary: Binary
+    _known: dict[float, list[Candidate]] = field(default_factory=dict)
+
+    def below(self, threshold: float) -> list[Candidate]:
+        """Return the long thin things at a level, longest first."""
+        if threshold not in self._known:
+            at_level = rebinarise(self.binary, threshold)
+            self._known[threshold] = find_candidates(at_level)
+        return self._known[threshold]
+
+
+def find_things(
+    levels: Levels, thresholds: Iterable[float], least_px: float
+) -> list[Thing]:
+    """Return the long thin things of a picture, the likeliest rod first.
+
+    Parameters
+    ----------
+    levels : Levels
+        The picture.
     thresholds : iterable of float
         The levels, the strictest first.
     least_px : float
@@ -91,7 +112,7 @@ def find_things(
     """
     things: list[Thing] = []
     for threshold in thresholds:
-        for item in find_candidates(rebinarise(binary, threshold)):
+        for item in levels.below(threshold):
             if item.length_px < least_px:
                 continue
             held = next((thing for thing in things if thing.covers(item)), None)
