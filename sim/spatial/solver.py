@@ -253,7 +253,7 @@ def solve_table(
 
 def _unloaded(table: Array, clamp: Array, s: Array) -> Array:
     """Return positions and tangents of the unloaded rod, shape (n, 6)."""
-    direction = clamp[:, 2]
+    direction = clamp[:, 2].copy()
     if not table[:, K1 : K3 + 1].any():
         line = np.empty((len(s), 6))
         line[:, :3] = s[:, None] * direction

@@ -53,17 +53,19 @@ def weighed_fit(problem: Problem, joints: Sequence[float], count: float) -> Curv
 
 @njit(cache=True)
 def _weighed(problem: Problem, joints: Array, count: float) -> Solved:
+    # Of Python's own constants each would have a version of all that it is passed to.
+    straight, unforced, last = np.int64(2), np.int64(1), np.bool_(True)
     none = np.empty(0)
-    free: Solved = solution(problem, 2, none, np.nan, True)
+    free: Solved = solution(problem, straight, none, np.nan, last)
     fits, ratios = [free], none
     if joints.size > 0:
         ratios = _ratios(free.kappa, problem.s, joints)
         if not np.all((ratios > 1.0 / _MOST) & (ratios < _MOST)):
             return free
-        nearest = solution(problem, 2, ratios, np.nan, True)
+        nearest = solution(problem, straight, ratios, np.nan, last)
         ratios = _ratios(nearest.kappa, problem.s, joints)
-        fits.append(solution(problem, 2, ratios, np.nan, True))
-    fits.append(solution(problem, 1, ratios, np.nan, True))
+        fits.append(solution(problem, straight, ratios, np.nan, last))
+    fits.append(solution(problem, unforced, ratios, np.nan, last))
     loss = np.array([_criterion(fit, count) for fit in fits])
     if joints.size > 0:
         loss[0] += _STRONG

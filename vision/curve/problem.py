@@ -119,7 +119,8 @@ def _smoothed(
     knots: Array, basis: Basis, s: Array, theta: Array, stiffness: float
 ) -> Array:
     """Return the coefficients of a smooth curve of about the given angles."""
-    normal, _ = penalty_between(knots, 2, np.empty(0), s, theta)
+    straight = np.int64(2)  # a constant of Python's own would have its own version
+    normal, _ = penalty_between(knots, straight, np.empty(0), s, theta)
     normal *= stiffness
     right = np.zeros(len(normal))
     add_squares(basis.first, basis.value, np.ones(theta.size), normal)
