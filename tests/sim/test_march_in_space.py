@@ -93,7 +93,9 @@ def test_the_last_march_leaves_its_table_to_that_for_the_shape() -> None:
     away = Field(replace(CUBOID, gap_mm=60.0))
     rod, field, n, clamp = table(ROD), field_array(away, 30.0), 20.0, clamp_of(SUPPORT)
     R, r, held = np.empty((3, 3)), np.empty(3), room(rod, field, 2.0 * n)
-    index, load, _ = solve_pose(rod, field, n, clamp, R, r, 1e-9, held)
+    index, load, _ = once(
+        lambda: solve_pose(rod, field, n, clamp, R, r, 1e-9, held), patience=1_000_000
+    )
     assert (index, load) == (0, 1.0)
     assert held[3][2] <= STILL
     ends = []
