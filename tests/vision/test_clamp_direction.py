@@ -108,19 +108,22 @@ def test_light_that_changes_on_the_rod_beside_its_clamp_widens_the_direction(bri
 
 def test_light_that_changes_all_along_a_rod_does_not_widen_the_direction():
     """It lights both sides alike: only beside its clamp may it light but one."""
-    frame = draw(
-        curve("straight", length_mm=20.0), np.random.default_rng(2), light=CLEAN,
-        size_px=(700, 500), clamp_px=(120.0, 250.0), angle_deg=0.0,
-    )  # fmt: skip
-    lit = frame.linear.copy()
-    ramp = np.linspace(0.0, 0.1, lit.shape[1], dtype=np.float32)
-    lit += ramp * (1.0 - lit / lit.max())
-    plain, found = (
-        extract(
-            as_photo(encode_srgb(light)), frame.truth.calibration,
-            clamp_square_sd_deg=90.0,
-        )
-        for light in (frame.linear, lit)
-    )  # fmt: skip
-    assert found.ok, found.reason
-    assert found.clamp_angle_sd_deg < 1.3 * plain.clamp_angle_sd_deg
+    told = []
+    for seed in range(2, 7):
+        frame = draw(
+            curve("straight", length_mm=20.0), np.random.default_rng(seed), light=CLEAN,
+            size_px=(700, 500), clamp_px=(120.0, 250.0), angle_deg=0.0,
+        )  # fmt: skip
+        lit = frame.linear.copy()
+        ramp = np.linspace(0.0, 0.1, lit.shape[1], dtype=np.float32)
+        lit += ramp * (1.0 - lit / lit.max())
+        for light in (frame.linear, lit):
+            found = extract(
+                as_photo(encode_srgb(light)),
+                frame.truth.calibration,
+                clamp_square_sd_deg=90.0,
+            )
+            assert found.ok, found.reason
+            told.append(found.clamp_angle_sd_deg)
+    # Of one frame it is a matter of chance, which the penalty's weight is.
+    assert np.median(told[1::2]) < 1.3 * np.median(told[::2])

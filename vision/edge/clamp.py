@@ -20,7 +20,7 @@ from ...core.jit import njit
 from ..curve.curve import Curve
 from ..curve.robust import median, quantiles
 from .crossings import Crossed, EndFace, crossings_of, line_through
-from .lanes import lanes, lanes_along
+from .lanes import lanes_along
 from .levels import clear_of
 from .step_line import SPAN, STEP_PX, fit_step
 
@@ -126,6 +126,7 @@ def find_clamp(
     blur: float,
     contrast: float,
     reach: float,
+    ahead: float = 0.0,
     optics: Sequence[float] = (),
     sign: float = 1.0,
     fine: bool = True,
@@ -140,6 +141,8 @@ def find_clamp(
         The axis, from about the clamp to the tip.
     expected, reach : float
         Where to look along s, and how far to either side, px.
+    ahead : float
+        And how much farther ahead for the front, px.
     width, blur : float
         Width of the rod and standard deviation of the blur, px.
     contrast : float
@@ -161,8 +164,9 @@ def find_clamp(
     wide = max(blur, _LEAST_PX)
     front = fit_step(
         _front(
-            grey, curve, expected, span, (_BESIDE if fine else _BESIDE[::2]) * width,
-            near, contrast, reach, sign,
+            grey, curve, expected + 0.5 * ahead, span + 0.5 * ahead,
+            (_BESIDE if fine else _BESIDE[::2]) * width, near, contrast,
+            reach + 0.5 * ahead, sign,
         ),
         blur=blur, inner=_CLAMP_SPAN * wide, outer=SPAN * wide, own=True, fine=fine,
     )  # fmt: skip
@@ -256,30 +260,6 @@ def _front(
         crossing[first:last],
     )  # fmt: skip
     return crossed
-
-
-def goes_on_at(
-    grey: Image, curve: Curve, s: Array, width: float, darkest: float
-) -> bool:
-    """Whether a dark line between two lighter sides goes on at places behind a root.
-
-    Parameters
-    ----------
-    grey : ndarray, shape (height, width), float32
-        Linear light.
-    curve : Curve
-        The axis, from its root.
-    s : ndarray, shape (n,)
-        Arc lengths, px; those behind the root are negative.
-    width : float
-        Width of the rod, px.
-    darkest : float
-        `DARKEST`, or `DIMMED` in a mix of colours.
-    """
-    beside = 0.5 * width + 4.0
-    across = np.array([-beside, -0.2 * width, 0.0, 0.2 * width, beside])
-    before = lanes(grey, curve, np.linspace(1.0, 3.0, 9) * width, across)
-    return is_dark_line(before, lanes(grey, curve, s, across), darkest)
 
 
 def is_dark_line(before: Array, behind: Array, darkest: float) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,18 +11,17 @@ from numpy.typing import NDArray
 
 from ..curve.curve import Curve
 from ..curve.robust import median
+from ..picture.sample import nearest_pixels
 from .clamp import (
-    DARKEST,
-    DIMMED,
     ClampLines,
     between,
     doubt_px,
     find_clamp,
-    goes_on_at,
 )
 from .clamp_light import STEP, clamp_light
 from .crossings import EndFace
 from .levels import clear_of
+from .sides_end import sides_end
 from .state import LostError, Root, Seen, State
 from .tip import find_tip
 from .wall_light import MIRRORED, SKY, Walls, short_of_end, wall_light
@@ -35,10 +35,9 @@ APART_PX = 2.0
 _SURE_PX = 0.5
 """Deviation of where the rod is seen to end above which its own light is asked."""
 
-_LEAST_SHADE, _SEEN_ON, _SHADED, _LAG_PX = 0.25, 0.7, 0.5, 1.5
-"""Widths of the rod by which a line is ahead of the root, and share of the stations
-there that show two edges, if it is a shade's; contrast in the shade over that on paper;
-and half of what a rise is taken over."""
+_SHADED, _LAG_PX = 0.5, 1.5
+"""Contrast in the clamp's shade over that on paper; and half of what a rise is taken
+over."""
 
 
 def find_ends(
@@ -95,37 +94,37 @@ def find_ends(
 def _clamp_lines(
     grey: Image, state: State, seen: Seen, sign: float, *, fine: bool
 ) -> ClampLines:
-    """Return the lines at a clamp, but not the front of its shade."""
+    """Return the lines at a clamp, close to where both sides of the rod end."""
+    expected, reach, ahead = state.first, 0.3 * state.width + 3.0, 0.0
+    end = sides_end(_light_of(grey, state), state.curve, state.first, state.width)
+    if end is not None:
+        ahead = state.foot_px
+        if fine:
+            near = clear_of(max(state.blur, state.clamp_blur)) + _LAG_PX
+            reach = min(reach, near)
+        if not fine or abs(end - expected) > reach:
+            expected = end
+    elif not fine:
+        reach = 1.3 * state.width
 
-    def between_places(low: float, high: float, contrast: float) -> ClampLines:
+    def seen_with(contrast: float) -> ClampLines:
         return find_clamp(
-            grey, state.curve, expected=0.5 * (low + high), width=state.width,
-            blur=state.clamp_blur or state.blur, contrast=contrast,
-            reach=0.5 * (high - low), optics=state.optics, sign=sign, fine=fine,
+            grey, state.curve, expected=expected, width=state.width,
+            blur=state.clamp_blur or state.blur, contrast=contrast, reach=reach,
+            ahead=ahead, optics=state.optics, sign=sign, fine=fine,
         )  # fmt: skip
 
-    width, contrast = state.width, seen.edges.contrast
-    low, high = state.first - 0.3 * width - 3.0, state.first + 0.3 * width + 3.0
-    if not (fine or state.from_front):
-        low, high = state.first - 1.55 * width, state.first + 1.05 * width
-    lines = between_places(low, high, contrast)
+    lines = seen_with(seen.edges.contrast)
     if lines.face is None and lines.front is None:
-        return between_places(low, high, _SHADED * contrast)
-    outer = _shade_line(lines, state, seen)
-    # In a mix of colours a shade's border on the rod may seem to be its end.
-    line, darkest = lines.front, DARKEST
-    if line is None and state.plain is not None:
-        line, darkest = lines.face, DIMMED
-    if outer is None and line is not None:
-        near = clear_of(max(state.blur, state.clamp_blur)) + state.face_px
-        at = line.s - near - np.linspace(0.0, 2.0, 5)
-        if goes_on_at(grey, state.curve, at, width, darkest):
-            outer, low = line.s, min(low, line.s - 1.55 * width)
-    if outer is None:
-        return lines
-    outer -= clear_of(state.blur) + _LAG_PX
-    inner = between_places(low, outer, _SHADED * contrast)
-    return lines if inner.face is None and inner.front is None else inner
+        return seen_with(_SHADED * seen.edges.contrast)
+    return lines
+
+
+def _light_of(grey: Image, state: State) -> Callable[[Array], Array]:
+    """Return what tells the light at places: of a mix, that of all its colours."""
+    if state.plain is not None and state.photo is not None:
+        return state.photo.light_at
+    return lambda places: nearest_pixels(grey, places)[..., None]
 
 
 def _in_own_light(state: State, *, fine: bool) -> ClampLines:
@@ -210,23 +209,6 @@ def _with_front(
     if front is None or abs(front.s - lines.face.s) > APART_PX:
         return lines
     return replace(lines, front=front)
-
-
-def _shade_line(lines: ClampLines, state: State, seen: Seen) -> float | None:
-    """Return where the border of a shade was taken for the front of the clamp.
-
-    Behind a front there are no edges of the rod, unless the camera sees its face.
-    """
-    line = lines.front
-    if line is None:
-        return None
-    clear = clear_of(state.blur)
-    behind = (seen.s > state.first + clear) & (seen.s < line.s - clear)
-    long = line.s - state.first > max(_LEAST_SHADE * state.width, 2.0 * clear)
-    on_face = is_face(line.s - state.first, state.face_px)
-    if not long or on_face or not behind.any():
-        return None
-    return line.s if seen.good[behind].mean() > _SEEN_ON else None
 
 
 def _face_seen(state: State, walls: Walls) -> float:

@@ -77,6 +77,7 @@ class State:
     photo: Photo | None = None
     clamp_light: ClampLight | None = None
     from_front: bool = False
+    foot_px: float = 0.0
 
     @property
     def optics(self) -> tuple[float, ...]:

@@ -101,7 +101,8 @@ def _fitted(
     place, skew, fitted, rise, known, off, uneven = _fit_step(
         light, s, across, line.s, line.skew, wide, inner, outer, own, optics
     )
-    if not (abs(place - line.s) < 2.0 * wide and np.any(known != 0.0)):
+    least = 2 if own else 1  # a lane alone tells of no line
+    if not (abs(place - line.s) < 2.0 * wide and np.sum(known != 0.0) >= least):
         # No step fits here: what was crossed may be anything as blurred as this.
         skew_sd = line.skew_sd * wide / line.sigma
         unsure = EndFace(

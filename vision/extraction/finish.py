@@ -102,8 +102,8 @@ def _refined(
     refined = refine(
         view.grey, start, root=candidate.root, sign=view.sign,
         joints=setting.joints_px, walls=setting.walls_px if walls else None,
-        face_px=setting.face_px(start.curve), sd_px=sd_px,
-        known_joints=joints, plain=None if view.plain else photo.grey,
+        face_px=setting.face_px(start.curve), foot_px=setting.foot_px(start.curve),
+        sd_px=sd_px, known_joints=joints, plain=None if view.plain else photo.grey,
         hidden_px=candidate.hidden_px, photo=photo, from_front=candidate.from_front,
     )  # fmt: skip
     if start.blur > FAR * start.width:

@@ -119,6 +119,7 @@ def refine(
     joints: Callable[[Curve], Sequence[float]] = lambda _curve: (),
     walls: Walls | None = None,
     face_px: float = 0.0,
+    foot_px: float = 0.0,
     sd_px: float = np.inf,
     known_joints: Array | None = None,
     plain: Image | None = None,
@@ -146,6 +147,9 @@ def refine(
         seen on the left.
     face_px : float
         How much of a clamp's face the camera may see, along the rod.
+    foot_px : float
+        And how far along the rod the line on the paper where it stands lies ahead of
+        where the rod leaves it.
     sd_px : float
         Standard deviation of the start where it tells the ends too, as in a film.
     known_joints : ndarray, optional
@@ -170,6 +174,7 @@ def refine(
     state = State(
         start.curve, half, start.width, 0.0, last, face_px, start.rough, start.blur,
         hidden=hidden_px, plain=plain, photo=photo, from_front=from_front,
+        foot_px=foot_px,
     )  # fmt: skip
     if from_front and photo is not None:
         state.clamp_light = clamp_light(photo, start.curve, 0.0, start.width, root=0.0)

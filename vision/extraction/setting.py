@@ -156,12 +156,19 @@ class Setting:
 
     def face_px(self, curve: Curve) -> float:
         """Return how much of a clamp's face may be seen at the root of a curve."""
+        height = self.clamp_height_mm or self.axis_height_mm + UNKNOWN_CLAMP_MM
+        return self._lean_px(curve) * height
+
+    def foot_px(self, curve: Curve) -> float:
+        """Return how much of it is seen below the axis."""
+        return self._lean_px(curve) * self.axis_height_mm
+
+    def _lean_px(self, curve: Curve) -> float:
+        """Return how much is seen of each mm of the height of a clamp's face."""
         if self.calibration is None:
             return 0.0
         ends = curve.points[:1], curve.theta[:1]
-        rise = self.view(self.calibration, *ends).rise_along[0]
-        height = self.clamp_height_mm or self.axis_height_mm + UNKNOWN_CLAMP_MM
-        return max(0.0, -float(rise) * height)
+        return max(0.0, -float(self.view(self.calibration, *ends).rise_along[0]))
 
     def view(self, camera: Calibration, points: Array, theta: Array) -> LocalView:
         """Return how the camera sees the rod's axis at points and angles in px."""
