@@ -112,4 +112,4 @@ def _contrast(
     light = np.log(np.maximum(light_at(spots), 0.0) + _LEAST_LIGHT)
     middle, left, right = np.sort(light, axis=1)[:, 1]  # the medians of three
     steps = np.sum((middle - left) * (middle - right), axis=-1)
-    return np.sqrt(np.maximum(steps, 0.0))
+    return np.asarray(np.sqrt(np.maximum(steps, 0.0)))
