@@ -37,7 +37,7 @@ _FALLS_OFF, _GRAIN = 0.4, 0.006
 across; by how much it may fall off across the picture,
 as a logarithm; and how far noise scatters dark ones."""
 
-_OTHER, _LARGE, _BLACK = 0.2, 0.1, 1e-3
+_OTHER, _LARGE, _BLACK = 0.12, 0.1, 1e-3
 """Distance from the first ground of what may be another, the least part of the picture
 that is one, and light that is told from none."""
 
