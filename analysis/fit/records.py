@@ -120,6 +120,7 @@ class Told:
             "sd": self.sd,
             "unit": self.unit,
             "moduli_percent": list(self.moduli_percent),
+            "sentence": self.sentence(),
         }
 
     def sentence(self) -> str:

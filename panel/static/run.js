@@ -229,6 +229,7 @@ function fitTable(fit) {
   const known = (fit.E_MPa ?? []).map((value, index) => h("tr", {}, h("th", {scope: "row"}, `section ${index + 1}`), h("td", {}, value === null ? "not identifiable" : `${num(value, 2)} ± ${num(fit.E_sd_MPa[index], 2)} MPa`)));
   const verdict = h("span", {class: `chip ${{supported: "good", doubtful: "warn", contradicted: "bad"}[fit.verdict] ?? ""}`}, fit.verdict ?? "no verdict");
   return [h("h3", {}, "Fitted moduli ", verdict), h("table", {}, h("tbody", {}, known)), (fit.reasons ?? []).map((reason) => h("p", {class: "doubt"}, reason)),
+    fit.rests_on?.length ? h("p", {class: "facts"}, `No photograph tests what the moduli rest on: ${fit.rests_on.map((told) => told.sentence).join(", ")}.`) : null,
     h("p", {class: "facts"}, `χ² over degrees of freedom ${num(fit.chi2_reduced, 2)}, p ${num(fit.p_value, 3)}. ${(fit.degenerate_directions ?? []).join(" ")}`)];
 }
 
