@@ -72,5 +72,6 @@ def _number(name: str, shot: Shot) -> str:
     return {
         "length_mm": f"a length of {rod.length_mm:g} mm",
         "magnet_percent": "the magnet's strength",
+        "meter_percent": "the readings of the field",
         "gap_mm": "the gaps",
     }.get(name, "")

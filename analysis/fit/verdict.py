@@ -25,6 +25,10 @@ Array = NDArray[np.float64]
 DOUBTFUL, CONTRADICTED = 0.05, 0.001
 """p-values below which a fit is doubtful, and contradicted."""
 
+FAR = 5.0
+"""Factor from what the specimen's file says, of all moduli alike, that is no surprise
+of the material any more but that of a unit."""
+
 SERIOUS_FLAGS = (
     "length_mismatch", "direction_doubtful", "joints_doubtful", "width_mismatch",
     "colour_mismatch",
@@ -44,7 +48,8 @@ def judge(result: FitResult, limits: Limits) -> Verdict:
             flags[flag] = flags.get(flag, 0) + 1
     serious = {name: count for name, count in flags.items() if name in SERIOUS_FLAGS}
     words = "supported"
-    if p_value < DOUBTFUL or serious or result.on_bounds:
+    far = _far_from_told(result)
+    if p_value < DOUBTFUL or serious or result.on_bounds or far:
         words = "doubtful"
     if p_value < CONTRADICTED:
         words = "contradicted"
@@ -56,7 +61,7 @@ def judge(result: FitResult, limits: Limits) -> Verdict:
     return Verdict(
         verdict=words,
         p_value=p_value,
-        reasons=_reasons(result, p_value, serious),
+        reasons=(*far, *_reasons(result, p_value, serious)),
         suspects=tuple(sorted(suspects, key=lambda suspect: -suspect.delta_chi2)),
         models=models,
         flags=flags,
@@ -80,6 +85,22 @@ def _p_of_best(result: FitResult, gains: list[float]) -> float:
         return 1.0
     one = float(stats.f.sf(max(gains), 1.0, result.linear.noise_freedom))
     return float(-np.expm1(len(gains) * np.log1p(-min(one, 1.0 - 1e-12))))
+
+
+def _far_from_told(result: FitResult) -> tuple[str, ...]:
+    """Say that all moduli are many times larger, or smaller, than was told."""
+    told = [section.E_MPa for section in result.problem.specimen.sections]
+    logs = np.log(np.array(result.E_MPa) / told)
+    logs = logs[np.isfinite(logs)]
+    if not len(logs) or abs(np.sum(np.sign(logs))) < len(logs):
+        return ()
+    if float(np.min(np.abs(logs))) < math.log(FAR):
+        return ()
+    low, high = np.exp(logs.min()), np.exp(logs.max())
+    return (
+        f"all moduli are {low:.2g} to {high:.2g} times those of the specimen's file: "
+        "if these are no guess, a unit is wrong (gauss for mT, a side, a remanence)",
+    )
 
 
 def _reasons(

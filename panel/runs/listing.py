@@ -124,7 +124,8 @@ def _between(gaps_mm: list[float]) -> list[float]:
 
 
 def _step(step: dict[str, Any]) -> dict[str, Any]:
-    images = [str(file["path"]) for file in step.get("files", [])]
+    paths = [str(file["path"]) for file in step.get("files", [])]
+    images = [path for path in paths if path.startswith("images/")]
     settle = step.get("settle") or {}
     return {
         "index": step["index"],

@@ -219,13 +219,14 @@ export function afterButtons(name, found) {
   const over = found.status !== "success" && found.steps.length < found.planned;
   return [
     over ? h("button", {type: "button", class: "primary", onclick: () => act("run-start", {resume: name})}, "Resume the run") : null,
-    job("extract", "Extract", found.steps.length > 0), job("fit", "Fit", found.has.includes("extract")), job("report", "Report", found.has.includes("extract")),
+    job("extract", "Extract", found.steps.some((step) => step.image)), job("fit", "Fit", found.has.includes("extract")), job("report", "Report", found.has.includes("extract")),
     h("button", {type: "button", onclick: () => act("job", {what: "verify", runs: [name]}, true)}, "Verify"),
     found.has.includes("report") ? h("a", {class: "button", href: `/runs/${encodeURIComponent(name)}/report.html`, target: "_blank"}, "Open the report") : null,
   ];
 }
 
-function fitTable(fit) {
+/** What a fit found, and what it is worth. */
+export function fitTable(fit) {
   const known = (fit.E_MPa ?? []).map((value, index) => h("tr", {}, h("th", {scope: "row"}, `section ${index + 1}`), h("td", {}, value === null ? "not identifiable" : `${num(value, 2)} ± ${num(fit.E_sd_MPa[index], 2)} MPa`)));
   const verdict = h("span", {class: `chip ${{supported: "good", doubtful: "warn", contradicted: "bad"}[fit.verdict] ?? ""}`}, fit.verdict ?? "no verdict");
   return [h("h3", {}, "Fitted moduli ", verdict), h("table", {}, h("tbody", {}, known)), (fit.reasons ?? []).map((reason) => h("p", {class: "doubt"}, reason)),

@@ -3,7 +3,7 @@
 import {act, toast} from "./actions.js";
 import {fill, h, num, say} from "./dom.js";
 import {query} from "./link.js";
-import {afterButtons, flags, showJobs} from "./run.js";
+import {afterButtons, fitTable, flags, showJobs} from "./run.js";
 
 export const title = "Runs";
 
@@ -75,6 +75,7 @@ async function show(name) {
     fill(view.detail, h("h2", {}, name), h("p", {}, `${found.status}${found.reason ? `: ${found.reason}` : ""}`), found.warnings?.map((text) => h("p", {class: "doubt"}, text)),
       h("div", {class: "row"}, afterButtons(name, found)),
       h("div", {class: "wide"}, h("table", {}, h("thead", {}, h("tr", {}, ["Gap, mm", "Flux, mT", "Doubts"].map((label) => h("th", {scope: "col"}, label)))), h("tbody", {}, found.steps.map((step) => h("tr", {}, h("th", {scope: "row"}, num(step.gap_mm, 2)), h("td", {}, step.flux_mT === null ? step.flux_status : num(step.flux_mT, 2)), h("td", {}, flags(step.flags))))))),
+      found.fit ? fitTable(found.fit) : null,
       h("div", {class: "thumbs"}, found.steps.filter((step) => step.image).map((step) => h("a", {href: `/runs/${encodeURIComponent(name)}/${step.image}`, target: "_blank"}, h("img", {src: `/runs/${encodeURIComponent(name)}/${step.image}?width=240`, alt: `photograph at ${num(step.gap_mm, 1)} mm`, width: 240, loading: "lazy"}), h("span", {}, num(step.gap_mm, 1, "mm"))))));
   } catch (error) {
     fill(view.detail, h("p", {class: "doubt"}, error.message));

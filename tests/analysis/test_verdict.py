@@ -296,3 +296,20 @@ def test_theories_that_fit_alike_are_not_ranked() -> None:
     assert second.aic - best.aic < 2.0
     assert "is preferred" not in model_sentence(verdict.models)
     assert " is as good as " in model_sentence(verdict.models)
+
+
+def test_readings_in_gauss_are_doubted_where_no_magnet_tells() -> None:
+    """Ten times the field and ten times the moduli fit as well as the right ones."""
+    run, _ = wrong_run(WRONG["bow 1/5000 per mm"], seed=113)
+    steps = tuple(replace(step, flux_mT=10.0 * step.flux_mT) for step in run.steps)
+    bare = replace(run, magnet=None)
+    right, wrong = (
+        fit_runs([one], model="uniform").verdict
+        for one in (bare, replace(bare, steps=steps))
+    )
+    assert right is not None
+    assert wrong is not None
+    assert not any("a unit is wrong" in reason for reason in right.reasons)
+    assert wrong.verdict != "supported"
+    assert "a unit is wrong" in wrong.reasons[0]
+    assert "the readings of the field" in wrong.told_sentence()

@@ -13,6 +13,7 @@ import pytest
 
 from magbend.core.errors import ConfigError, InputError, StoreError
 from magbend.panel import Workspace
+from magbend.panel.runs.listing import run_detail
 from magbend.panel.runs.plan_file import check_plan, write_plan
 from magbend.panel.toml_edit import edited
 
@@ -186,3 +187,28 @@ def test_a_demo_leaves_the_folder_of_somebody_else_alone(tmp_path):
     with pytest.raises(StoreError, match="was not made by magbend"):
         prepare_demo(tmp_path, seed=2)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_an_imported_run_of_shapes_has_no_photographs(tmp_path: Path) -> None:
+    """The files of its steps are shapes: no picture to be shown or extracted."""
+    from magbend.analysis import import_table
+    from magbend.sim import UniformField, gmc, solve
+
+    (tmp_path / "rod.toml").write_text(
+        'name = "rod"\nside_mm = 1.0\nremanence_mT = 20.07\n'
+        + "".join(
+            f"[[section]]\nlength_mm = 10.0\nE_MPa = {E}\n" for E in (20.0, 15.0, 10.0)
+        )
+    )
+    shape = solve(gmc(2), UniformField(flux_mT=50.0)).centreline
+    assert shape is not None
+    shape.to_csv(tmp_path / "s.csv")
+    (tmp_path / "t.csv").write_text("centreline,gap_mm,flux_mT\ns.csv,60,50\n")
+    import_table(
+        tmp_path / "t.csv",
+        tmp_path / "runs" / "ours",
+        specimen_file=tmp_path / "rod.toml",
+    )
+    found = run_detail(Workspace(tmp_path / "rig.toml"), "ours")
+    assert [step["image"] for step in found["steps"]] == [None]
+    assert found["has"] == ["extract"]
