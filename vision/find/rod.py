@@ -249,7 +249,7 @@ def _edge_distance(
         slice(int(x == 0), w + 2 - int(x + w == width)),
     )
     depth = np.zeros(roi.shape, np.float32)
-    depth[inside] = cv2.distanceTransform(roi[inside], cv2.DIST_L2, 5)
+    cv2.distanceTransform(roi[inside], cv2.DIST_L2, 5, depth[inside])  # in place
     return depth
 
 
