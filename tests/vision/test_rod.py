@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from magbend.vision.find.binarise import Binary
+from magbend.vision.find.discs import places_of
 from magbend.vision.find.level_sets import LevelSets
 from magbend.vision.find.rod import find_candidates
 from magbend.vision.find.straight_on import straight_on
@@ -113,3 +114,10 @@ def test_a_web_at_a_root_leads_nowhere():
         level=level, before=before,
     )  # fmt: skip
     assert straight_on(web, np.zeros(count), set()).barred
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (3, 5), (4, 8), (9, 7)])
+def test_places_of_a_thing_are_found_in_any_shape(shape):
+    mask = (np.random.default_rng(1).random(shape) < 0.3).astype(np.uint8)
+    mask[-1, -1] = 1
+    np.testing.assert_array_equal(places_of(mask), np.flatnonzero(mask))

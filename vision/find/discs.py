@@ -18,11 +18,29 @@ def opened(mask: Mask, radius: int) -> Mask:
     """Return a mask less whatever no disc of this radius inside it covers."""
     if radius > _SMALL:
         depth = np.asarray(cv2.distanceTransform(mask, cv2.DIST_L2, 5), np.float32)
-        core = near_core(depth, np.flatnonzero(mask), float(radius), float(radius))
+        core = near_core(depth, places_of(mask), float(radius), float(radius))
         return np.asarray(mask & core)
     size = 2 * radius + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size))
     return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, disc), np.uint8)
+
+
+@njit(cache=True)
+def places_of(mask: Mask) -> NDArray[np.intp]:
+    """Return the flat indices of what is not 0.
+
+    Numpy takes ten times as long: here eight pixels are looked at in one.
+    """
+    flat = mask.ravel()
+    words = flat[: flat.size // 8 * 8].view(np.uint64)
+    found, count = np.empty(flat.size, np.intp), 0
+    for word in range(words.size + 1):
+        if word == words.size or words[word]:
+            for place in range(8 * word, min(8 * word + 8, flat.size)):
+                if flat[place]:
+                    found[count] = place
+                    count += 1
+    return found[:count]
 
 
 @njit(cache=True)

@@ -16,7 +16,7 @@ from ...core.jit import njit
 from .across import joined, leads_to
 from .binarise import Binary
 from .candidate import Candidate
-from .discs import near_core
+from .discs import near_core, places_of
 from .trace import traced
 
 Array = NDArray[np.float64]
@@ -126,7 +126,7 @@ def _fill(
 def _thin_parts(roi: Mask, origin: tuple[int, int], binary: Binary) -> list[Candidate]:
     """Return the thin parts of a thing: of the commonest width, or grown from that."""
     depth = _edge_distance(roi, origin, binary)
-    places = np.flatnonzero(roi)
+    places = places_of(roi)
     ridge = _ridge(depth, places)
 
     def of_width(half: float) -> list[Candidate]:
