@@ -179,6 +179,8 @@ class Table:
 
     def _cause(self, cell: str) -> str:
         text = cell.strip()
+        if text.lower() in _NOTHING:
+            return "; leave the row out if nothing was measured there"
         if self.stray_point and COMMA_NUMBER.fullmatch(text):
             return (
                 f", but {self.stray_point}: write all decimals of the file with a "

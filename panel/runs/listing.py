@@ -153,5 +153,6 @@ def _fit(folder: Path) -> dict[str, Any] | None:
     keys = (
         "verdict", "p_value", "reasons", "E_MPa", "E_sd_MPa", "chi2_reduced",
         "not_identifiable", "model", "steps", "degenerate_directions", "rests_on",
+        "suspects",
     )  # fmt: skip
     return {key: data.get(key) for key in keys}

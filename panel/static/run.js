@@ -229,7 +229,9 @@ export function afterButtons(name, found) {
 export function fitTable(fit) {
   const known = (fit.E_MPa ?? []).map((value, index) => h("tr", {}, h("th", {scope: "row"}, `section ${index + 1}`), h("td", {}, value === null ? "not identifiable" : `${num(value, 2)} ± ${num(fit.E_sd_MPa[index], 2)} MPa`)));
   const verdict = h("span", {class: `chip ${{supported: "good", doubtful: "warn", contradicted: "bad"}[fit.verdict] ?? ""}`}, fit.verdict ?? "no verdict");
+  const likely = fit.reasons?.length ? (fit.suspects ?? []).slice(0, 3).map((one) => one.value === null ? one.name : `${one.name} = ${num(one.value, 3)} ± ${num(one.sd, 3)} ${one.unit}`) : [];
   return [h("h3", {}, "Fitted moduli ", verdict), h("table", {}, h("tbody", {}, known)), (fit.reasons ?? []).map((reason) => h("p", {class: "doubt"}, reason)),
+    likely.length ? h("p", {class: "doubt"}, `Would explain it, best first: ${likely.join("; ")}.`) : null,
     fit.rests_on?.length ? h("p", {class: "facts"}, `No photograph tests what the moduli rest on: ${fit.rests_on.map((told) => told.sentence).join(", ")}.`) : null,
     h("p", {class: "facts"}, `χ² over degrees of freedom ${num(fit.chi2_reduced, 2)}, p ${num(fit.p_value, 3)}. ${(fit.degenerate_directions ?? []).join(" ")}`)];
 }

@@ -79,7 +79,7 @@ REFUSED = {
     "a unit behind a decimal comma": (b"x_mm;y_mm\n38,0 mm;2,5\n", "unit in the head"),
     "German thousands": (b"x_mm;y_mm\n1.250,5;2,5\n", "thousands without a point"),
     "a unit in the cell": (b"x_mm,y_mm\n38 mm,2\n", "line 2.*unit in the head"),
-    "nan": (b"x_mm,y_mm\nnan,2\n", "line 2: x_mm must be a number"),
+    "nan": (b"x_mm,y_mm\nnan,2\n", "line 2: x_mm must be a number.*leave the row out"),
     "infinity": (b"x_mm,y_mm\n1,inf\n", "line 2: y_mm must be a number"),
     "overflow": (b"x_mm,y_mm\n1,1e999\n", "line 2: y_mm must be a number"),
     "empty cell": (b"x_mm,y_mm\n1,\n", "line 2: y_mm must be a number"),
