@@ -40,7 +40,7 @@ def fit_midline(
     """Return the curve, points used, how far it moved, and joints as they were found.
 
     `known` are the joints that a pass before found, from the root on; `foreseen` tells
-    that no pass was before, and none need be after: the curve is a film's forecast.
+    that the passes began with a film's forecast, which is off alike in many frames.
     """
     width = state.width
     if last - first < 4.0 * width:
@@ -106,8 +106,7 @@ def _missed(state: State, s: Array, offset: Array, weights: Array) -> Array:
     """Return by how much farther than it was found the midline lies, px.
 
     Edges are held back where they were expected: that holds of what moved the rod as a
-    whole, not of what scatters about it. Once more after a pass, it would only make
-    more of the noise.
+    whole, not of what scatters about it. It makes more of the noise, too.
     """
     share = 1.0 / followed(state.blur, state.fuzz, 0.5 * state.width) - 1.0
     rows = np.vander((s - s[0]) / (s[-1] - s[0]), _WHOLE + 1)

@@ -201,7 +201,7 @@ def refine(
             known = places - first
         fit, used, aside, places = fit_midline(
             state, seen, first, end, joints, known, seeking=seeking,
-            clamped=root == "clamp", foreseen=not (turn or seeking),
+            clamped=root == "clamp", foreseen=in_film,
         )  # fmt: skip
         at = fit.curve.s + first
         width, sigma_width = _smooth_width(
