@@ -103,13 +103,20 @@ def _far_from_told(result: FitResult) -> tuple[str, ...]:
     )
 
 
+def _share(p_value: float) -> str:
+    """Return a probability in words; no noise is known well enough for tinier ones."""
+    if p_value < 1e-6:
+        return "less than one in a million"
+    return f"{100.0 * p_value:.2g} %"
+
+
 def _reasons(
     result: FitResult, p_value: float, serious: dict[str, int]
 ) -> tuple[str, ...]:
     reasons = list(result.on_bounds)
     if p_value < DOUBTFUL:
         reasons.append(
-            f"a right model would look as bad in {100.0 * p_value:.2g} % of all runs: "
+            f"a right model would look as bad in {_share(p_value)} of all runs: "
             f"{result.rms_um:.2g} µm RMS are left along the lines, whose own errors "
             f"are about {np.median(result.noise_um):.2g} µm"
         )

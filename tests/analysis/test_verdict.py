@@ -36,6 +36,7 @@ def test_a_wrong_model_is_covered_or_not_supported(name: str) -> None:
     fit = fit_runs([run])
     verdict = fit.verdict
     assert verdict is not None
+    assert "e-" not in " ".join(verdict.reasons)  # numbers for people
     z = (np.array(fit.E_MPa) - moduli) / fit.E_sd_MPa
     assert np.all(np.abs(z) < 1.96) or verdict.verdict != "supported"
     if WRONG[name].told:

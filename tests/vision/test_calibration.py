@@ -184,8 +184,11 @@ def test_damaged_calibration_is_refused_in_a_sentence(tmp_path, change, words):
 
 
 def test_missing_calibration_is_refused(tmp_path):
-    with pytest.raises(ConfigError, match="no such file"):
-        read_calibration(tmp_path / "calibration.json")
+    path = tmp_path / "calibration.json"
+    with pytest.raises(
+        ConfigError, match=f"no such file; .* calibrate .* --out {path}"
+    ):
+        read_calibration(path)
 
 
 def test_text_in_place_of_a_calibration_is_no_json(tmp_path):

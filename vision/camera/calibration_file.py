@@ -113,6 +113,11 @@ def read_calibration(path: Path) -> Calibration:
         If the file is missing, a key is missing, unknown or impossible, or the numbers
         do not make a camera.
     """
+    if not path.exists():
+        raise ConfigError(
+            f"{path}: there is no such file; name yours, or write one: "
+            f"magbend vision calibrate BOARD.png --out {path}"
+        )
     model = read_toml(path, CalibrationModel, is_json=True)
     try:
         return _calibration(model)
