@@ -281,5 +281,11 @@ from .twin.run import (
     open_twin_bench as open_twin_bench,
 )
 from .warm_up import (
-    main as main,
+    is_warm as is_warm,
+)
+from .warm_up import (
+    stored as stored,
+)
+from .warm_up import (
+    warm_up_beside as warm_up_beside,
 )

@@ -2,17 +2,36 @@
 
 Numba compiles a kernel when it is first called and keeps the result. A first command
 would wait for that, one kernel after another; ``python -m magbend.analysis.warm_up``
-(and `magbend demo`, once it has shown its report) does it beforehand.
+does it beforehand, `magbend demo` once it has shown its report, and `magbend panel`
+beside its page.
 """
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
+import os
+import signal
 import subprocess
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from multiprocessing.connection import wait
+from pathlib import Path
 
 import numpy as np
+
+from ..core.errors import SolverError
+
+
+def stored() -> tuple[int, int]:
+    """Return how many of the largest kernels are compiled, and how many there are."""
+    from ..sim.planar.solver import solve_rows
+    from ..sim.solid.newton import solve_shape
+    from ..vision.batch import cold
+
+    done, number = cold.stored()
+    return done + solve_rows.is_stored + solve_shape.is_stored, number + 2
 
 
 def is_warm() -> bool:
@@ -20,31 +39,79 @@ def is_warm() -> bool:
 
     The largest kernels are in the cache, or no folder can be written to keep them in.
     """
-    from ..sim.planar.solver import solve_rows
-    from ..sim.solid.newton import solve_shape
-    from ..vision.batch.cold import is_cold
+    done, number = stored()
+    return done == number or not _cache_folder()
 
-    if not solve_rows.cache_folder:
-        return True
-    return solve_rows.is_stored and solve_shape.is_stored and not is_cold()
+
+def _cache_folder() -> str:
+    from ..sim.planar.solver import solve_rows
+
+    return solve_rows.cache_folder
 
 
 def warm_up() -> None:
-    """Compile what photographs, solves and fits call, in two processes."""
+    """Compile what photographs, solves and fits call, in two processes.
+
+    Of two calls at a time, in any processes, the second waits for the first.
+
+    Raises
+    ------
+    SolverError
+        If a process fails; it has said why.
+    """
+    from ..core.jit import one_process
+
     context = multiprocessing.get_context("spawn")
-    with context.Pool(2) as pool:
-        jobs = (_photograph, _curve, _rod, _solid)
-        for result in [pool.apply_async(job) for job in jobs]:
-            result.get()
+    with one_process(Path(_cache_folder(), "warm_up.lock")):
+        if is_warm():
+            return
+        workers = [
+            context.Process(target=_work, args=jobs, daemon=True)
+            for jobs in ((_photograph,), (_rod, _curve, _solid))
+        ]
+        with _deaf():
+            for worker in workers:
+                worker.start()
+        for worker in workers:
+            worker.join()
+    if any(worker.exitcode for worker in workers):
+        raise SolverError("the numerical kernels could not all be compiled")
 
 
-def warm_up_beside() -> None:
+def warm_up_beside() -> subprocess.Popen[bytes]:
     """Compile in a process that goes on when this one has ended."""
     quiet = subprocess.DEVNULL
-    subprocess.Popen(
+    return subprocess.Popen(
         [sys.executable, "-m", "magbend.analysis.warm_up"],
         stdin=quiet, stdout=quiet, stderr=quiet, start_new_session=True,
     )  # fmt: skip
+
+
+@contextlib.contextmanager
+def _deaf() -> Iterator[None]:
+    """Start processes that do not hear Ctrl-C: their parent alone answers it."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, previous)
+
+
+def _work(*jobs: Callable[[], None]) -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+    for job in jobs:
+        job()
+
+
+def _end_with(sentinel: int) -> None:
+    """End this process with its parent, however that is ended."""
+    wait([sentinel])
+    os._exit(1)
 
 
 def _rod() -> None:
@@ -92,7 +159,11 @@ def main(tell: Callable[[str], object] = sys.stderr.write) -> None:
     """Compile what is not compiled yet."""
     if not is_warm():
         tell("compiling the numerical kernels (once, a few minutes)\n")
-        warm_up()
+        try:
+            warm_up()
+        except KeyboardInterrupt:
+            tell("stopped; what is compiled is kept\n")
+            raise SystemExit(128 + signal.SIGINT) from None
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ import typer
 
 from ..core.errors import MissingExtraError
 from .console import say
+from .keys import terminating
 
 EXAMPLE = "Example: magbend panel --rig rig.toml"
 
@@ -61,8 +62,7 @@ def open_panel(
 
         address = Address(host=host, port=port, names=names)
         shown = Panel(Workspace(rig), twin=Twin(seed=seed, speed=speed))
-        _warm()
-        with contextlib.suppress(KeyboardInterrupt):
+        with contextlib.suppress(KeyboardInterrupt), terminating():
             serve(shown, address, browser=browser, tell=say)
 
 
@@ -71,17 +71,9 @@ def open_demo(out: Path, *, seed: int, port: int, browser: bool) -> None:
     with _extra():
         from ..panel import prepare_demo
 
-        _warm()
         rig = prepare_demo(out, seed=seed)
     say(f"{rig.parent}: a computed bench; home it, go to a gap, start the run")
     open_panel(rig, port=port, browser=browser, seed=seed, speed=3.0)
-
-
-def _warm() -> None:
-    """Compile the kernels first: while they compile, a page would wait for its stop."""
-    from ..analysis import main
-
-    main(lambda text: say(text.rstrip(), err=True))
 
 
 @contextlib.contextmanager

@@ -14,8 +14,8 @@ import itertools
 import os
 import threading
 import warnings
-from collections.abc import Callable
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 from types import CodeType
@@ -178,15 +178,25 @@ def _one_at_a_time(compiled: Any) -> Callable[[Any], Any]:
     def compile_in_turn(signature: Any) -> Any:
         with global_compiler_lock, ExitStack() as held:
             if not compiled._compiling_counter:
-                with suppress(ImportError, OSError):  # a system or disk without locks
-                    from fcntl import LOCK_EX, flock
-
-                    lock = Path(f"{file._index_path}.lock")
-                    flock(held.enter_context(lock.open("w")), LOCK_EX)
+                held.enter_context(one_process(Path(f"{file._index_path}.lock")))
                 _remove_outdated(file)
             return compile_(signature)
 
     return compile_in_turn
+
+
+@contextmanager
+def one_process(lock: Path) -> Iterator[None]:
+    """Wait until no other process is in a block with this lock file.
+
+    The system frees the lock of a process that is ended.
+    """
+    with ExitStack() as held:
+        with suppress(ImportError, OSError):  # a system or disk without locks
+            from fcntl import LOCK_EX, flock
+
+            flock(held.enter_context(lock.open("w")), LOCK_EX)
+        yield
 
 
 def _remove_outdated(file: Any) -> None:

@@ -15,6 +15,7 @@ from .bench.theory import Place, overlay, predict
 from .controls import Controls
 from .hub import Hub
 from .journal import Journal
+from .kernels import KernelWatch
 from .runs.jobs import Jobs
 from .runs.supervisor import Supervisor
 from .state import compose
@@ -58,6 +59,7 @@ class Panel:
         self.field = FieldWatch(
             self.owner, workspace, self.hub.changed, lambda: self.hub.is_watched
         )
+        self.kernels = KernelWatch(self.hub.changed)
         self.supervisor = Supervisor(workspace, self.hub.changed)
         self.supervisor.over = self.connect
         self.jobs = Jobs(workspace, self.hub.changed)
@@ -77,6 +79,7 @@ class Panel:
         self.owner.begin()
         self.sight.begin()
         self.field.begin()
+        self.kernels.begin()
         self.connect()
 
     def connect(self) -> None:
@@ -90,6 +93,7 @@ class Panel:
         """Hold and let go of the bench; a run goes on in its own process."""
         if self._begun.is_set():
             self.supervisor.close()
+            self.kernels.close()
             self.sight.close()
             self.field.close()
             self.owner.close()
@@ -141,6 +145,7 @@ class Panel:
     def _measure(self, picture: Picture) -> dict[str, Any]:
         from ..vision import Setting, as_photo, follow
 
+        self.kernels.require()
         files = self.workspace.files()
         calibration = files.calibration
         size = picture.image.shape[1::-1]

@@ -10,6 +10,7 @@ from .bench.owner import BenchOwner
 from .bench.sight import Sight
 from .hub import Hub
 from .journal import Journal
+from .kernels import KernelWatch
 from .runs.jobs import Jobs
 from .runs.supervisor import Supervisor
 from .workspace import Workspace
@@ -26,6 +27,7 @@ class Parts(Protocol):
     jobs: Jobs
     hub: Hub
     journal: Journal
+    kernels: KernelWatch
 
     @property
     def is_twin(self) -> bool:
@@ -45,6 +47,7 @@ def compose(panel: Parts) -> dict[str, Any]:
         "jobs": panel.jobs.facts(),
         "pages": len(panel.hub.pages),
         "journal": panel.journal.trouble,
+        "compiling": panel.kernels.news,
     }
 
 

@@ -75,6 +75,7 @@ function banners(state) {
     if (state.camera.trouble) list.push(["bad", state.camera.trouble]);
     if (state.meter.trouble) list.push(["warn", state.meter.trouble]);
     if (state.meter.status === "overload") list.push(["warn", "The Tesla-meter is beyond its range (overload): choose a higher range, or go farther away."]);
+    if (state.compiling) list.push(["note", state.compiling]);
     if (state.journal) list.push(["warn", state.journal]);
     if (state.files.twin) list.push(["twin", "Computed bench (twin): no real device moves."]);
   }

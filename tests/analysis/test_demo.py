@@ -81,5 +81,6 @@ def test_nothing_is_called_warm_that_photographs_find_cold(
 ) -> None:
     if not solve_rows.cache_folder:
         pytest.skip("no folder keeps kernels here")
-    monkeypatch.setattr(cold, "is_cold", lambda: True)
+    monkeypatch.setattr(cold, "stored", lambda: (11, 12))
+    assert cold.is_cold()
     assert not warm_up.is_warm()

@@ -51,9 +51,15 @@ _LATEST: tuple[Kernel, ...] = (
 """Kernels of every part of a measurement, the slowest to compile among them."""
 
 
+def stored() -> tuple[int, int]:
+    """Return how many of the kernels that come last are compiled, and their number."""
+    return sum(kernel.is_stored for kernel in _LATEST), len(_LATEST)
+
+
 def is_cold() -> bool:
     """Whether kernels of a measurement are not compiled yet."""
-    return not all(kernel.is_stored for kernel in _LATEST)
+    done, number = stored()
+    return done < number
 
 
 def compile_kernels() -> None:
