@@ -24,6 +24,12 @@ echo:; Max feedrates (units/s):
 echo:  M203 X10.00 Y10.00 Z5.00 E25.00
 echo:; Max Acceleration (units/s2):
 echo:  M201 X50.00 Y50.00 Z100.00 E10000.00"""
+# With INCH_MODE_SUPPORT, after G20: every number is divided by 25.4.
+M503_INCHES = re.sub(
+    r"([XYZE])([\d.]+)",
+    lambda value: f"{value[1]}{float(value[2]) / 25.4:.2f}",
+    M503.replace("G21    ; Units in mm (mm)", "G20    ; Units in inches (in)"),
+)
 M211 = "echo:Soft endstops: On  Min: X0.00 Y0.00 Z0.00   Max: X200.00 Y200.00 Z180.00"
 
 
@@ -37,7 +43,7 @@ class MarlinBoard:
         self._out: list[tuple[float, bytes]] = []
         self.x_mm = 37.0
         self.homed = self.silent = self.short = self.old = False
-        self.waits = self.place_in_ok = self.relative = False
+        self.waits = self.place_in_ok = self.relative = self.inches = False
         self.offset_mm = 0.0  # G92
         self.motors_off_after_s = 120.0
         self.ok = "ok"
@@ -73,7 +79,7 @@ class MarlinBoard:
         if line == "M115":
             self.say("FIRMWARE_NAME:Marlin 2.1.2.4 MACHINE_TYPE:Stage", now)
         elif line == "M503":
-            self.say(M503, now)
+            self.say(M503_INCHES if self.inches else M503, now)
         elif line == "M211" and not self.old:
             self.say(M211, now)
         elif line.startswith("G28"):
@@ -89,6 +95,8 @@ class MarlinBoard:
             self.x_mm += distance * (0.5 if self.short else 1.0)
         elif line.startswith("M118") and not self.old:
             self.say(line[5:], now)
+        elif line in ("G20", "G21") and not self.old:
+            self.inches = line == "G20"
         elif line in ("G90", "G91"):
             self.relative = line == "G91"
         elif line.startswith(("M118", "M211")) or (line == "G21" and self.old):
@@ -163,6 +171,22 @@ def test_coordinates_that_another_program_left_relative_are_absolute_again(tmp_p
     assert board.x_mm == 37.5
     stage.assume_homed(37.5, (160.0, -1))
     board.relative = True
+    stage.move_to(50.0, feed_mm_min=600.0)
+    assert board.x_mm == 50.0
+
+
+def test_a_board_that_another_program_left_in_inches_is_read_in_mm():
+    clock, board = InterruptingClock(), MarlinBoard()
+    board.inches = True
+    config = StageConfig(
+        driver="marlin", port=register_board("inches", board, clock),
+        homing="manual", feed_mm_min=600.0,
+    )  # fmt: skip
+    stage = MarlinStage(config, clock)
+    stage.connect()
+    assert stage.limits.step_mm == 1 / 80
+    assert stage.limits.max_feed_mm_min == 600.0
+    stage.assume_homed(37.0, (160.0, -1))
     stage.move_to(50.0, feed_mm_min=600.0)
     assert board.x_mm == 50.0
 

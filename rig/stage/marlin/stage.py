@@ -285,6 +285,8 @@ def _question(session: MarlinSession, boot_s: float) -> tuple[str, list[str]]:
     firmware = next((text for text in lines if "FIRMWARE_NAME" in text), "")
     if not firmware:
         raise StageError("the board answers, but not with Marlin's FIRMWARE_NAME")
+    with contextlib.suppress(LineRefusedError):  # a build that knows no inches
+        session.command("G21")  # where an earlier program left inches, M503 tells them
     settings = session.command("M503")
     with contextlib.suppress(LineRefusedError):  # a build without soft end stops
         settings += session.command("M211")
