@@ -121,6 +121,14 @@ def test_only_the_soft_limit_alarm_keeps_the_position():
     assert not alarm_text(99).position_kept
 
 
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [(13, "emergency stop"), (14, "homing first"), (17, "motor's driver")],
+)
+def test_alarms_of_the_relatives_are_named(code, words):
+    assert words in alarm_text(code).meaning
+
+
 def test_unknown_errors_still_have_words():
     assert "manual" in error_text("79")
     assert "manual" in error_text("Bad")

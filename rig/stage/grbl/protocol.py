@@ -93,6 +93,21 @@ ALARMS: dict[int, AlarmText] = {
         meaning="a limit switch is closed",
         remedy="free the switch by hand, then home (magbend rig home)",
     ),
+    13: AlarmText(
+        meaning="FluidNC's emergency stop is pressed; grblHAL protects its probe",
+        remedy="release the stop, " + _HOME,
+    ),
+    14: AlarmText(
+        meaning="FluidNC wants homing first; grblHAL's spindle", remedy=_HOME
+    ),
+    15: AlarmText(
+        meaning="FluidNC has just started; grblHAL found no second switch of an axis",
+        remedy="look at the switches, then home (magbend rig home)",
+    ),
+    17: AlarmText(
+        meaning="grblHAL says that a motor's driver reports a fault",
+        remedy="look at motor, driver and their supply, then home (magbend rig home)",
+    ),
 }
 
 
