@@ -6,7 +6,7 @@ from importlib import resources
 from pathlib import Path
 
 from ..core.errors import StoreError
-from ..core.files import write_text
+from ..core.files import write_bytes
 
 FOLDERS = {
     "magbend.examples": "",
@@ -16,10 +16,12 @@ FOLDERS = {
     "magbend.examples.lumens": "lumens",
 }
 KINDS = (".py", ".md", ".toml", ".csv", ".ipynb")
+PHOTOGRAPHS = ("photographs/calib_D.jpg", "photographs/dev_10.jpg")
+"""A board and a rod before the same camera, in `magbend.examples`."""
 
 
 def copy_examples(folder: Path) -> list[Path]:
-    """Copy scripts and input files; return where they lie.
+    """Copy scripts, input files and photographs; return where they lie.
 
     Parameters
     ----------
@@ -35,11 +37,15 @@ def copy_examples(folder: Path) -> list[Path]:
     for package, inside in FOLDERS.items():
         for entry in resources.files(package).iterdir():
             if entry.name.endswith(KINDS) and entry.name != "__init__.py":
-                copies[folder / inside / entry.name] = entry.read_text("utf-8")
+                copies[folder / inside / entry.name] = entry.read_bytes()
+    for name in PHOTOGRAPHS:
+        copies[folder / name] = (
+            resources.files("magbend.examples") / name
+        ).read_bytes()
     for path in sorted(copies):
         if path.exists():
             raise StoreError(f"{path} is there already; name another folder")
-    for path, text in copies.items():
+    for path, data in copies.items():
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_text(path, text)
+        write_bytes(path, data)
     return sorted(copies)

@@ -3,7 +3,7 @@
     python benchmarks/bench_rendered.py PATH/TO/rendered
 
 The folder holds photographs, the board as ``calib_*`` and ``truth/NAME.json``;
-without a path the few photographs of ``fixtures/vision/rendered`` are used. Shapes are
+without a path the few photographs of ``examples/photographs`` are used. Shapes are
 compared in the rod's own frame: RMS and largest distance across the true axis, and the
 tip's error as a vector's length. "aligned" takes the best rigid motion out first, which
 shows how much of the error is the clamp's place and direction.
@@ -23,7 +23,7 @@ import numpy as np
 from magbend.vision import Board, calibrate, extract, read_photo
 from magbend.vision.synthetic.scoring import signed_distance
 
-FIXTURES = Path(__file__).parents[1] / "fixtures" / "vision" / "rendered"
+FIXTURES = Path(__file__).parents[1] / "examples" / "photographs"
 
 
 def read_truth(path: Path) -> dict[str, Any]:

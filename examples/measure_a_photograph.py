@@ -6,13 +6,14 @@ python examples/measure_a_photograph.py [folder]
 from __future__ import annotations
 
 import sys
+from importlib import resources
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 
 from magbend.vision import Board, Measurement, calibrate, extract, read_photo
 
-PHOTOGRAPHS = Path(__file__).resolve().parents[1] / "fixtures" / "vision" / "rendered"
+PHOTOGRAPHS = Path(str(resources.files("magbend.examples"))) / "photographs"
 ROD, AXIS_HEIGHT_MM = PHOTOGRAPHS / "dev_10.jpg", 0.9
 
 

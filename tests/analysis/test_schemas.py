@@ -53,6 +53,7 @@ def test_examples_are_copied_once(tmp_path: Path) -> None:
     wanted = {
         "simulate_a_shape.py", "library/million.toml", "specimens/gmc2.toml",
         "lumens/bend90.toml", "lumens/fork.toml",
+        "photographs/calib_D.jpg", "photographs/dev_10.jpg",
     }  # fmt: skip
     assert {Path(name) for name in wanted} <= paths
     with pytest.raises(StoreError, match="is there already"):

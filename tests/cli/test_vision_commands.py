@@ -17,7 +17,7 @@ from magbend.vision.batch.tables import read_centrelines, read_frames, to_centre
 from magbend.vision.synthetic.scoring import signed_distance
 
 FIXTURES = Path(__file__).parents[2] / "fixtures" / "vision"
-RENDERED = FIXTURES / "rendered"
+RENDERED = Path(__file__).parents[2] / "examples" / "photographs"
 BOARD = RENDERED / "calib_D.jpg"
 
 
@@ -228,7 +228,7 @@ def test_a_specimen_is_known_from_its_file_or_from_the_run(
     magbend, calibration, tmp_path
 ):
     rod = FIXTURES.parent / "specimens" / "gmc2.toml"
-    photo = FIXTURES / "rendered" / "dev_05.jpg"
+    photo = RENDERED / "dev_05.jpg"
     code, _, messages = magbend(
         "vision", "extract", photo, "--calibration", calibration, "--specimen", rod,
         "--out", tmp_path / "given",

@@ -15,7 +15,7 @@ from magbend.core.errors import CameraError
 from magbend.core.picture import decode_picture, picture_size
 from magbend.rig.camera.mjpeg import BrokenPictureError, decode_jpeg
 
-PHOTO = Path(__file__).parents[2] / "fixtures/vision/rendered/dev_12.jpg"
+PHOTO = Path(__file__).parents[2] / "examples/photographs/dev_12.jpg"
 IMAGE = cv2.GaussianBlur(
     np.random.default_rng(5).integers(0, 255, (90, 160, 3), np.uint8), (0, 0), 2.0
 )

@@ -45,6 +45,12 @@ def test_every_example_is_listed_and_tested() -> None:
         assert f'"{name}"' in here
 
 
+def test_no_example_needs_the_sources() -> None:
+    for kind in ("*.py", "*.ipynb"):  # `magbend examples` copies them anywhere
+        for path in EXAMPLES.glob(kind):
+            assert "fixtures" not in path.read_text(encoding="utf-8"), path.name
+
+
 def test_a_graded_rod_bends_nearer_to_a_circle(folder: Path) -> None:
     share = example("simulate_a_shape").main(folder)
     # A weakly bent uniform rod under a tip load: curvature falls linearly, 3/4.

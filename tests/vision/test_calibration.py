@@ -31,7 +31,7 @@ from magbend.vision.measurement import Pose
 from magbend.vision.picture.photo import Photo, as_photo, read_photo
 from magbend.vision.synthetic import render_board, scene_camera
 
-FIXTURES = Path(__file__).parents[2] / "fixtures" / "vision" / "rendered"
+FIXTURES = Path(__file__).parents[2] / "examples" / "photographs"
 BOARD = Board()
 
 

@@ -29,6 +29,7 @@ from magbend.vision.synthetic.scoring import signed_distance
 from magbend.vision.synthetic.square_view import HARD, STANDARD, curve, draw
 
 FIXTURES = Path(__file__).parents[2] / "fixtures" / "vision"
+RENDERED = Path(__file__).parents[2] / "examples" / "photographs"
 SIZE = (1200, 1000)
 
 
@@ -172,7 +173,7 @@ def test_known_joints_sharpen_the_curvature():
 
 
 def camera_of(name: str = "calib_D.json") -> Calibration:
-    data = json.loads((FIXTURES / "rendered" / name).read_text())
+    data = json.loads((RENDERED / name).read_text())
     k = np.array(data["K"])
     u, _, v = np.linalg.svd(np.array(data["R_world_to_cam"]))
     return Calibration(
@@ -186,9 +187,9 @@ def camera_of(name: str = "calib_D.json") -> Calibration:
 
 @pytest.mark.parametrize("name", ["dev_03", "dev_05", "dev_07", "dev_10", "dev_12"])
 def test_rendered_photographs_are_measured_in_mm(name):
-    truth = json.loads((FIXTURES / "rendered" / f"{name}.json").read_text())
+    truth = json.loads((RENDERED / f"{name}.json").read_text())
     result = extract(
-        read_photo(FIXTURES / "rendered" / f"{name}.jpg"), camera_of(),
+        read_photo(RENDERED / f"{name}.jpg"), camera_of(),
         rod_height_mm=truth["axis_height_mm"], length_mm=truth["length_mm"],
     )  # fmt: skip
     assert result.ok
@@ -204,7 +205,7 @@ def test_rendered_photographs_are_measured_in_mm(name):
 
 
 def test_board_is_no_rod():
-    result = extract(read_photo(FIXTURES / "rendered" / "calib_D.jpg"), camera_of())
+    result = extract(read_photo(RENDERED / "calib_D.jpg"), camera_of())
     assert result.status == "failed"
     assert "no_rod" in result.flags
     assert not result.points

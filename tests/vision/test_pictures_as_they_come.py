@@ -27,7 +27,7 @@ from magbend.vision.camera.board import Board
 from magbend.vision.picture.photo import as_photo, decode_photo, read_photo
 from magbend.vision.picture.turn import turned
 
-RENDERED = Path(__file__).parents[2] / "fixtures" / "vision" / "rendered"
+RENDERED = Path(__file__).parents[2] / "examples" / "photographs"
 RAMP = np.tile(np.arange(256, dtype=np.uint8), (64, 1))
 UNEVEN = np.random.default_rng(0).integers(0, 255, (40, 64), dtype=np.uint8)
 
