@@ -27,6 +27,11 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 PATIENCE = 5_000
 """Calls of kernels, a few tenths of a second, after which a task goes on compiled."""
 
+PLAIN_FIRST = True
+"""Whether what is not compiled yet runs as plain Python at first.
+
+Else it is compiled when it is called: who calls everything many times is done sooner.
+"""
 FIRST_CALLS = 20
 """Calls of a public function that run as plain Python before anything is compiled."""
 MOST = 50_000
@@ -283,7 +288,7 @@ def plain_first(
 
         @functools.wraps(function)
         def call(*args: Any, **options: Any) -> Any:
-            if left[0] > 0:
+            if PLAIN_FIRST and left[0] > 0:
                 if _calls_left.get() is None and not kernel.is_at_hand:
                     if fits(*args, **options):
                         left[0] -= 1

@@ -13,11 +13,17 @@ from typing import NamedTuple
 
 import pytest
 
+from magbend.core import jit
+
 # Before numpy is loaded: threads of OpenBLAS that wait for each other spin, and where
 # several workers share the cores a solve of 200 unknowns takes ten times its work.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 sys.path.insert(0, str(Path(__file__).parent))  # for `house`
+
+# In a fresh clone all that is compiled by and by would first run as plain Python, for
+# minutes.
+jit.PLAIN_FIRST = False
 
 
 def pytest_configure() -> None:

@@ -44,14 +44,32 @@ def test_a_kernel_called_by_a_kernel_compiles_with_it() -> None:
 
 def test_once_runs_as_written_and_needs_no_numba() -> None:
     code = (
-        "import sys; from magbend.core.jit import once\n"
+        "import sys; from magbend.core import jit; from magbend.core.jit import once\n"
         "from magbend.sim import UniformField, gmc, solve\n"
         "once(lambda: solve(gmc(2), UniformField(flux_mT=50.0)))\n"
         "assert 'numba' not in sys.modules\n"
+        "jit.PLAIN_FIRST = False\n"
         "solve(gmc(2), UniformField(flux_mT=50.0))\n"
         "assert 'numba' in sys.modules\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("patient", [True, False])
+def test_first_calls_run_as_written_unless_told_otherwise(
+    monkeypatch: pytest.MonkeyPatch, patient: bool
+) -> None:
+    monkeypatch.setattr(jit, "PLAIN_FIRST", patient)
+    kernel = jit.Kernel(lambda x: x + 1.0, {})
+    plain = []
+
+    @jit.plain_first(kernel)
+    def public(x: float) -> float:
+        plain.append(jit._calls_left.get() is not None)
+        return kernel(x)
+
+    assert [public(float(i)) for i in range(jit.FIRST_CALLS + 2)][-1] == 22.0
+    assert plain == [patient] * jit.FIRST_CALLS + [False] * 2
 
 
 def test_long_work_goes_on_compiled(monkeypatch: pytest.MonkeyPatch) -> None:

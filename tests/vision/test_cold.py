@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from magbend.core import jit
 from magbend.core.jit import once
 from magbend.vision import as_photo, extract
 from magbend.vision.batch import cold
@@ -28,16 +29,25 @@ def test_plain_python_measures_what_compiled_kernels_do():
 
 
 def test_nothing_is_done_in_plain_python_once_all_is_compiled(monkeypatch):
+    monkeypatch.setattr(jit, "PLAIN_FIRST", True)
     monkeypatch.setattr(cold, "is_cold", lambda: False)
     assert not list(cold.while_cold(str, [1, 2, 3]))
 
 
-def test_few_are_done_without_a_helper_and_in_their_order(monkeypatch):
+@pytest.fixture
+def cold_start(monkeypatch):
+    """Pretend that nothing is compiled."""
+    monkeypatch.setattr(jit, "PLAIN_FIRST", True)
     monkeypatch.setattr(cold, "is_cold", lambda: True)
+
+
+@pytest.mark.usefixtures("cold_start")
+def test_few_are_done_without_a_helper_and_in_their_order(monkeypatch):
     monkeypatch.setattr(cold, "multiprocessing", None)  # no process may start
     assert list(cold.while_cold(str, [3, 1, 2])) == ["3", "1", "2"]
 
 
+@pytest.mark.usefixtures("cold_start")
 def test_many_are_left_to_the_kernels_as_soon_as_these_are_compiled(monkeypatch):
     class Helper:
         left = 2
@@ -58,6 +68,5 @@ def test_many_are_left_to_the_kernels_as_soon_as_these_are_compiled(monkeypatch)
         join = terminate
 
     context = type("Context", (), {"Process": Helper})
-    monkeypatch.setattr(cold, "is_cold", lambda: True)
     monkeypatch.setattr(cold.multiprocessing, "get_context", lambda _kind: context)
     assert list(cold.while_cold(str, range(9))) == ["0", "1"]

@@ -8,7 +8,6 @@ import pytest
 
 from magbend.core.errors import VisionError
 from magbend.vision import Setting, extract_files, ring_down, ring_of_film
-from magbend.vision.batch import cold
 from magbend.vision.batch import run as batch_run
 from magbend.vision.batch.tables import read_frames
 from magbend.vision.synthetic import CLEAN, curve, draw, scene_camera
@@ -124,7 +123,6 @@ def test_frames_of_a_film_are_followed_and_none_is_lost(film, tmp_path, monkeypa
         return follow(photo, setting, last)
 
     monkeypatch.setattr(batch_run, "follow", watched)
-    monkeypatch.setattr(cold, "is_cold", lambda: False)
     extract_files([path], tmp_path, setting=setting, overlays=False, workers=2)
     rows = read_frames(tmp_path / "frames.csv")
     assert len(rows) == 40

@@ -15,6 +15,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from ...core import jit
 from ...core.jit import Kernel, once
 from ..curve.fit import solution
 from ..curve.joints import _evidence, _model
@@ -85,7 +86,7 @@ def while_cold(
     todo : sequence
         The tasks. Few are done to the end: they are not worth the compiling.
     """
-    if not todo or not is_cold():
+    if not todo or not jit.PLAIN_FIRST or not is_cold():
         return
     helper = None
     if len(todo) > FEW:
