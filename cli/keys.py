@@ -18,12 +18,16 @@ if TYPE_CHECKING:
 _POLL_S = 0.1
 
 
+class Terminated(KeyboardInterrupt):
+    """SIGTERM, treated as Ctrl-C."""
+
+
 @contextlib.contextmanager
 def terminating() -> Iterator[None]:
-    """Treat SIGTERM as Ctrl-C, so that the stage is held and the ending written."""
+    """Treat SIGTERM as Ctrl-C: the stage is held, the ending written, helpers end."""
 
     def interrupt(_number: int, _frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
+        raise Terminated
 
     previous = signal.signal(signal.SIGTERM, interrupt)
     try:

@@ -10,6 +10,7 @@ import typer
 from ..core.errors import MagbendError
 from . import analysis, bench, migrate, panel, rig, sim, vision
 from .console import say
+from .keys import Terminated, terminating
 
 app = typer.Typer(
     name="magbend",
@@ -61,22 +62,23 @@ def options(
 
 
 INTERRUPTED = 130
-"""Exit code after Ctrl-C, as of shells: 128 and the number of SIGINT."""
+TERMINATED = 143
+"""Exit codes after Ctrl-C and SIGTERM, as of shells: 128 and the signal's number."""
 
 
 def main() -> None:
     """Run the command line; a user's mistake ends in one sentence and exit code 1.
 
-    Ctrl-C ends in one sentence too, and exit code 130.
+    Ctrl-C and SIGTERM end in one sentence too, and exit codes 130 and 143.
     """
     try:
-        app()
+        with terminating():
+            app()
     except KeyboardInterrupt as stop:
-        _say_interrupted(stop)
-        sys.exit(INTERRUPTED)
+        sys.exit(_say_interrupted(stop))
     except SystemExit as end:
         if end.code == INTERRUPTED:  # typer's, for a Ctrl-C within a command
-            _say_interrupted(end)
+            sys.exit(_say_interrupted(end))
         raise
     except MagbendError as error:
         _stop(error, str(error))
@@ -92,12 +94,16 @@ def main() -> None:
         _stop(error, f"{name}{reason}")
 
 
-def _say_interrupted(end: BaseException | None) -> None:
-    """Say so, and what the interrupted command noted is kept (`console.progress`)."""
+def _say_interrupted(end: BaseException | None) -> int:
+    """Say so, and what the interrupted command noted is kept; return the exit code."""
     while end is not None and not isinstance(end, KeyboardInterrupt):
         end = end.__cause__ or end.__context__
     notes = getattr(end, "__notes__", [])
-    say("; ".join(["magbend: stopped by Ctrl-C", *notes]), err=True)
+    name, code = "Ctrl-C", INTERRUPTED
+    if isinstance(end, Terminated):
+        name, code = "SIGTERM", TERMINATED
+    say("; ".join([f"magbend: stopped by {name}", *notes]), err=True)
+    return code
 
 
 def _stop(error: Exception, sentence: str) -> None:

@@ -20,6 +20,13 @@ def press_ctrl_c(*_args: object, **_kwargs: object) -> None:
     raise AssertionError("Ctrl-C was not heard")
 
 
+def send_sigterm(*_args: object, **_kwargs: object) -> None:
+    os.kill(os.getpid(), signal.SIGTERM)
+    for _ in range(1_000_000):
+        mT_from_T(1.0)
+    raise AssertionError("SIGTERM was not heard")
+
+
 def interrupted(monkeypatch: pytest.MonkeyPatch, where: str, *arguments: str) -> int:
     """Run a command that is interrupted in the function `where`; return the code."""
     monkeypatch.setattr(where, press_ctrl_c)
@@ -58,3 +65,17 @@ def test_before_the_command_began_too(
 ) -> None:
     assert interrupted(monkeypatch, "magbend.cli.main.app") == 130
     assert capsys.readouterr().err == "magbend: stopped by Ctrl-C\n"
+
+
+def test_sigterm_ends_as_ctrl_c_does(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    # Its default action leaves worker processes behind, which wait for ever.
+    before = signal.getsignal(signal.SIGTERM)
+    monkeypatch.setattr("magbend.sim.fit_magnet", send_sigterm)
+    monkeypatch.setattr(sys, "argv", ["magbend", "sim", "magnet"])
+    with pytest.raises(SystemExit) as end:
+        command_line.main()
+    assert end.value.code == 143
+    assert capsys.readouterr().err == "magbend: stopped by SIGTERM\n"
+    assert signal.getsignal(signal.SIGTERM) is before
