@@ -158,12 +158,21 @@ def test_a_paler_tail_is_no_shade_but_a_level_step_is():
     s = np.arange(-30.0, 20.0, 0.5)
 
     def place(light):
-        return _rough_end(light, s, 0.0, 12.0, 2.2, 8.0, 0.0)
+        return _rough_end(light, s, 0.0, 12.0, 2.2, 8.0, 0.0, 0.0)
 
     tail = np.clip((s + 20.0) / 36.0, 0.0, 1.0)
     assert place(tail) == pytest.approx(-2.0, abs=0.6)
     step = 0.28 * ndtr(s + 8.0) + 0.72 * ndtr(s - 6.0)
     assert place(step) == pytest.approx(-8.0, abs=0.6)
+
+
+@pytest.mark.parametrize("level", [0.1, 0.8])
+def test_paper_or_rod_alone_holds_no_end(level):
+    """A tip sought behind its place was found on the paper, where noise rises least."""
+    s = np.arange(-30.0, 20.0, 0.5)
+    noise = 0.005 * np.random.default_rng(1).standard_normal(s.size)
+    found = _rough_end(level + noise, s, 0.0, 12.0, 2.2, 8.0, 0.0, 0.2 * (0.8 - 0.1))
+    assert np.isnan(found)
 
 
 def test_a_step_of_which_nothing_is_known_is_none():

@@ -62,7 +62,8 @@ def find_ends(
     for far, soft in ((reach, blur), (1.3 * width, blur), (1.3 * width, state.blur)):
         tip = find_tip(
             grey, curve, expected=state.last + outwards, width=min(width, taper),
-            blur=soft, reach=far, middle=middle, face=face, sign=sign, fine=fine,
+            blur=soft, reach=far, contrast=seen.edges.contrast, middle=middle,
+            face=face, sign=sign, fine=fine,
         )  # fmt: skip
         if tip is not None:
             break
@@ -76,7 +77,7 @@ def find_ends(
     if root == "border":
         return tip, None, _border_crossing(grey, curve)
     if root == "free":
-        return tip, None, _other_end(grey, state, sign, outwards, reach)
+        return tip, None, _other_end(grey, state, seen, sign, outwards, reach)
     lines = ClampLines(face=None, front=None)
     rough = state.from_front and not fine
     if rough or state.clamp_light is None:
@@ -260,12 +261,12 @@ def is_face(apart: float, face_px: float) -> bool:
 
 
 def _other_end(
-    grey: Image, state: State, sign: float, outwards: float, reach: float
+    grey: Image, state: State, seen: Seen, sign: float, outwards: float, reach: float
 ) -> float:
     back = state.curve.reversed()
     end = find_tip(
         grey, back, expected=outwards - state.first, width=state.width,
-        blur=state.blur, reach=reach, sign=sign,
+        blur=state.blur, reach=reach, contrast=seen.edges.contrast, sign=sign,
     )  # fmt: skip
     if end is None:
         raise LostError("no_tip", "an end of the rod has no edge")

@@ -31,6 +31,8 @@ to the deepest that can be told from the rod."""
 _LEVEL, _FLAT = 2.0, 0.4
 """How far before an end the level of a shade is looked at, in what its blur reaches;
 and by how much of itself it may vary there, which a blurred end does by more."""
+_FAINT = 0.2
+"""Part of a rod's contrast below which there is no end: it is paper, or rod, alone."""
 _STEP_SIDE_PX, _SOFTER, _FACE_SEEN = 2.0, 1.8, 1.3
 """How far about a place its slope is looked for; how much less steep a shade ends than
 its rod; and how much more of an end face may be seen than its width tells."""
@@ -48,6 +50,7 @@ def find_tip(
     width: float,
     blur: float,
     reach: float,
+    contrast: float,
     middle: float = 0.0,
     face: float | None = None,
     sign: float = 1.0,
@@ -65,6 +68,8 @@ def find_tip(
         Where to look along s, and how far to either side, px.
     width, blur : float
         Width of the rod and standard deviation of the blur, px.
+    contrast : float
+        Light of the paper less that of the rod, along it.
     middle : float
         Offset of the lanes' centre from the curve, px.
     face : float or None
@@ -84,7 +89,8 @@ def find_tip(
     outer = max(4.0, SPAN * blur)
     seen = _crossed(
         grey, curve, _LANES * width, middle, expected, reach, near, inner, outer,
-        max(4.0, 3.0 * blur), 0.5 * width, math.nan if face is None else face, sign,
+        max(4.0, 3.0 * blur), 0.5 * width, math.nan if face is None else face,
+        _FAINT * contrast, sign,
     )  # fmt: skip
     return fit_step(seen, blur=blur, inner=inner, outer=outer, fine=fine)
 
@@ -93,7 +99,7 @@ def find_tip(
 def _crossed(
     grey: Image, curve: Curve, across: Array, middle: float, expected: float,
     reach: float, near: float, inner: float, outer: float, level: float, half: float,
-    face: float, sign: float,
+    face: float, least_rise: float, sign: float,
 ) -> Crossed:  # fmt: skip
     """Return lanes where they cross the end, seen in a rough look at their mean."""
     s = np.arange(
@@ -103,7 +109,7 @@ def _crossed(
     light = lanes_along(grey, curve, s, middle + across, sign)
     inside = light[3:-3]
     profile = np.sum(inside, axis=0) / len(inside)
-    place = _rough_end(profile, s, expected, reach, near, inner, face)
+    place = _rough_end(profile, s, expected, reach, near, inner, face, least_rise)
     crossing = crossings_of(light, s, place, near, inner, level, half)
     crossed: Crossed = line_through(light, s, across, crossing)
     return crossed
@@ -112,7 +118,7 @@ def _crossed(
 @njit(cache=True)
 def _rough_end(
     profile: Array, s: Array, expected: float, reach: float, near: float, inner: float,
-    face: float,
+    face: float, least_rise: float,
 ) -> float:  # fmt: skip
     """Find where the mean lane leaves the rod: the first time, going outwards.
 
@@ -122,7 +128,7 @@ def _rough_end(
     """
     rod = _median(profile[s < expected - reach - near])
     paper = _quantile(profile[s > expected], 0.75)
-    if not paper > rod:
+    if not paper - rod > least_rise:
         return np.nan
     light = (profile - rod) / (paper - rod)
     within = (s >= expected - reach) & (s <= expected + reach)
