@@ -20,7 +20,7 @@ def picture(*, rod=0.1, paper=0.7, clamp=0.3, **marks):
     """Return a straight rod that leaves a clamp, with what else lies across it.
 
     A `line` on the paper at x, a `shade` of the clamp as far as x, `top` of another
-    light than its front, which begins 12 px behind it.
+    light than its front, which begins 12 px behind it, and a `screw` at x on it.
     """
     y, x = np.mgrid[:HEIGHT, :WIDE].astype(float)
     light = np.full((HEIGHT, WIDE), paper)
@@ -33,6 +33,8 @@ def picture(*, rod=0.1, paper=0.7, clamp=0.3, **marks):
     light[x < ROOT] = clamp
     if "top" in marks:
         light[x < ROOT - 12.0] = marks["top"]
+    if "screw" in marks:
+        light[(np.abs(y - Y) < 0.5 * WIDTH) & (np.abs(x - marks["screw"]) < 22.0)] = rod
     light = cv2.GaussianBlur(light, (0, 0), 1.2)
     return (light + np.random.default_rng(3).normal(0.0, 0.004, light.shape)).astype(
         np.float32
@@ -54,7 +56,7 @@ def light_of(grey):
 
 KINDS = [
     {}, {"line": ROOT + 45.0}, {"shade": ROOT + 60.0}, {"top": 0.9}, {"top": 0.12},
-    {"clamp": 0.12}, {"rod": 0.6, "paper": 0.05},
+    {"clamp": 0.12}, {"screw": ROOT - 60.0}, {"rod": 0.6, "paper": 0.05},
     {"rod": 0.6, "paper": 0.05, "top": 0.9},
 ]  # fmt: skip
 

@@ -126,6 +126,7 @@ def find_clamp(
     blur: float,
     contrast: float,
     reach: float,
+    on_rod: float = math.inf,
     ahead: float = 0.0,
     optics: Sequence[float] = (),
     sign: float = 1.0,
@@ -141,8 +142,9 @@ def find_clamp(
         The axis, from about the clamp to the tip.
     expected, reach : float
         Where to look along s, and how far to either side, px.
-    ahead : float
-        And how much farther ahead for the front, px.
+    on_rod, ahead : float
+        How far at most for the end on the rod, and how much farther ahead for the
+        front, px.
     width, blur : float
         Width of the rod and standard deviation of the blur, px.
     contrast : float
@@ -171,7 +173,9 @@ def find_clamp(
         blur=blur, inner=_CLAMP_SPAN * wide, outer=SPAN * wide, own=True, fine=fine,
     )  # fmt: skip
     face = fit_step(
-        _face(grey, curve, expected, span, width, near, contrast, reach, sign),
+        _face(
+            grey, curve, expected, span, width, near, contrast, min(reach, on_rod), sign
+        ),
         blur=blur, inner=SPAN * blur, outer=_CLAMP_SPAN * blur, fine=fine,
         told=_told_blur(front, optics) if fine else (0.0, math.inf),
     )  # fmt: skip

@@ -81,11 +81,14 @@ def find_ends(
     lines = ClampLines(face=None, front=None)
     rough = state.from_front and not fine
     if rough or state.clamp_light is None:
-        lines = _clamp_lines(grey, state, seen, sign, fine=fine)
+        place = sides_end(_light_of(grey, state), curve, state.first, state.width)
+        lines = _clamp_lines(grey, state, seen, sign, place, fine=fine)
     if rough:
         lines = _nearer(lines, _in_own_light(state, fine=fine), state)
     elif not (lines.face and doubt_px(lines.face) < _SURE_PX):
         lines = _with_own(lines, state, fine=fine)
+    if lines.face is None and lines.front is None:
+        lines = _clamp_lines(grey, state, seen, sign, None, fine=fine)
     if not rough and state.clamp_light is None and state.plain is not None:
         lines = _with_front(lines, state.plain, state, seen, fine=fine)
     state.clamp_blur = lines.blur
@@ -93,32 +96,40 @@ def find_ends(
 
 
 def _clamp_lines(
-    grey: Image, state: State, seen: Seen, sign: float, *, fine: bool
+    grey: Image, state: State, seen: Seen, sign: float, end: float | None, *, fine: bool
 ) -> ClampLines:
-    """Return the lines at a clamp, close to where both sides of the rod end."""
+    """Return the lines at a clamp, in paper's light or that of its shade."""
+    contrast = seen.edges.contrast
+    lines = _lines_near(grey, state, end, contrast, sign, fine=fine)
+    if lines.face is None and lines.front is None:
+        return _lines_near(grey, state, end, _SHADED * contrast, sign, fine=fine)
+    return lines
+
+
+def _lines_near(
+    grey: Image, state: State, end: float | None, contrast: float, sign: float, *,
+    fine: bool,
+) -> ClampLines:  # fmt: skip
+    """Return the lines near where a rod's sides end, if known: its own lanes' closely.
+
+    Its front may be seen behind its end, as on a chamfer, or as far ahead as its foot.
+    """
     expected, reach, ahead = state.first, 0.3 * state.width + 3.0, 0.0
-    end = sides_end(_light_of(grey, state), state.curve, state.first, state.width)
+    if end is None and not fine:
+        reach = 1.3 * state.width
+    on_rod = reach
     if end is not None:
         ahead = state.foot_px
         if fine:
             near = clear_of(max(state.blur, state.clamp_blur)) + _LAG_PX
-            reach = min(reach, near)
-        if not fine or abs(end - expected) > reach:
+            on_rod = min(reach, near)
+        if not fine or abs(end - expected) > on_rod:
             expected = end
-    elif not fine:
-        reach = 1.3 * state.width
-
-    def seen_with(contrast: float) -> ClampLines:
-        return find_clamp(
-            grey, state.curve, expected=expected, width=state.width,
-            blur=state.clamp_blur or state.blur, contrast=contrast, reach=reach,
-            ahead=ahead, optics=state.optics, sign=sign, fine=fine,
-        )  # fmt: skip
-
-    lines = seen_with(seen.edges.contrast)
-    if lines.face is None and lines.front is None:
-        return seen_with(_SHADED * seen.edges.contrast)
-    return lines
+    return find_clamp(
+        grey, state.curve, expected=expected, width=state.width,
+        blur=state.clamp_blur or state.blur, contrast=contrast, reach=reach,
+        on_rod=on_rod, ahead=ahead, optics=state.optics, sign=sign, fine=fine,
+    )  # fmt: skip
 
 
 def _light_of(grey: Image, state: State) -> Callable[[Array], Array]:

@@ -4,7 +4,8 @@ A shade's border, a line on the paper, the edge of a chamfer or of the clamp's t
 a rod or lie beside it as the clamp's front does. But only there do both sides of the
 rod end: on this side of it the rod differs from what lies to its left and to its right,
 on paper, in shade, and on a face of the clamp that the camera sees behind it; on the
-other side nothing does.
+other side nothing does, over a width at least; what is seen farther behind, as a screw
+on the clamp, is another thing.
 """
 
 from __future__ import annotations
@@ -78,9 +79,13 @@ def sides_end(
     n = max(round(width / step), 2)
     middle = seen[n:-n]
     better = (seen[2 * n :] + seen[: -2 * n] - 2.0 * middle) / n
-    best = int(np.argmax(better))
-    if not better[best] > _SURE:
+    sure = np.flatnonzero(better > _SURE)
+    if sure.size == 0:
         return None
+    # The first from the tip: what is seen behind a gap is another thing.
+    best = int(sure[-1])
+    while best > 0 and better[best - 1] >= better[best]:
+        best -= 1
     return _half_way(s, contrast, n + best, max(n // 2, 2))
 
 
