@@ -81,14 +81,11 @@ def find_ends(
     lines = ClampLines(face=None, front=None)
     rough = state.from_front and not fine
     if rough or state.clamp_light is None:
-        place = sides_end(_light_of(grey, state), curve, state.first, state.width)
-        lines = _clamp_lines(grey, state, seen, sign, place, fine=fine)
+        lines = _clamp_lines(grey, state, seen, sign, fine=fine)
     if rough:
         lines = _nearer(lines, _in_own_light(state, fine=fine), state)
     elif not (lines.face and doubt_px(lines.face) < _SURE_PX):
         lines = _with_own(lines, state, fine=fine)
-    if lines.face is None and lines.front is None:
-        lines = _clamp_lines(grey, state, seen, sign, None, fine=fine)
     if not rough and state.clamp_light is None and state.plain is not None:
         lines = _with_front(lines, state.plain, state, seen, fine=fine)
     state.clamp_blur = lines.blur
@@ -96,9 +93,10 @@ def find_ends(
 
 
 def _clamp_lines(
-    grey: Image, state: State, seen: Seen, sign: float, end: float | None, *, fine: bool
+    grey: Image, state: State, seen: Seen, sign: float, *, fine: bool
 ) -> ClampLines:
     """Return the lines at a clamp, in paper's light or that of its shade."""
+    end = sides_end(_light_of(grey, state), state.curve, state.first, state.width)
     contrast = seen.edges.contrast
     lines = _lines_near(grey, state, end, contrast, sign, fine=fine)
     if lines.face is None and lines.front is None:
