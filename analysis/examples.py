@@ -16,8 +16,8 @@ FOLDERS = {
     "magbend.examples.lumens": "lumens",
 }
 KINDS = (".py", ".md", ".toml", ".csv", ".ipynb")
-PHOTOGRAPHS = ("photographs/calib_D.jpg", "photographs/dev_10.jpg")
-"""A board and a rod before the same camera, in `magbend.examples`."""
+PHOTOGRAPHS = "photographs"
+"""A board and rods before the same camera, and what is true of each."""
 
 
 def copy_examples(folder: Path) -> list[Path]:
@@ -38,10 +38,8 @@ def copy_examples(folder: Path) -> list[Path]:
         for entry in resources.files(package).iterdir():
             if entry.name.endswith(KINDS) and entry.name != "__init__.py":
                 copies[folder / inside / entry.name] = entry.read_bytes()
-    for name in PHOTOGRAPHS:
-        copies[folder / name] = (
-            resources.files("magbend.examples") / name
-        ).read_bytes()
+    for entry in (resources.files("magbend.examples") / PHOTOGRAPHS).iterdir():
+        copies[folder / PHOTOGRAPHS / entry.name] = entry.read_bytes()
     for path in sorted(copies):
         if path.exists():
             raise StoreError(f"{path} is there already; name another folder")
