@@ -99,6 +99,9 @@ def _clamp_lines(
     end = sides_end(_light_of(grey, state), state.curve, state.first, state.width)
     contrast = seen.edges.contrast
     lines = _lines_near(grey, state, end, contrast, sign, fine=fine)
+    if lines.face is not None and lines.front is None and end is not None:
+        # One that is askew may need more room; what lies there else is its shade's.
+        return _lines_near(grey, state, end, contrast, sign, fine=fine, roomy=True)
     if lines.face is None and lines.front is None:
         return _lines_near(grey, state, end, _SHADED * contrast, sign, fine=fine)
     return lines
@@ -106,7 +109,7 @@ def _clamp_lines(
 
 def _lines_near(
     grey: Image, state: State, end: float | None, contrast: float, sign: float, *,
-    fine: bool,
+    fine: bool, roomy: bool = False,
 ) -> ClampLines:  # fmt: skip
     """Return the lines near where a rod's sides end, if known: its own lanes' closely.
 
@@ -121,6 +124,7 @@ def _lines_near(
         if fine:
             near = clear_of(max(state.blur, state.clamp_blur)) + _LAG_PX
             on_rod = min(reach, near)
+            ahead += 0.0 if roomy else on_rod - reach
         if not fine or abs(end - expected) > on_rod:
             expected = end
     return find_clamp(
