@@ -49,6 +49,9 @@ class Supervisor:
         self._thread = threading.Thread(target=self._work, name="run", daemon=True)
         self._facts: dict[str, Any] | None = None
         self._starting_s = 0.0
+        # A run may still answer while its process ends and the next one begins.
+        self._followed: int | None = 0
+        self._before: int | None = 0
         self._process: subprocess.Popen[bytes] | None = None
         self._number = 0
         self._seen_s = 0.0
@@ -100,6 +103,7 @@ class Supervisor:
         self.last_run = folder.name
         with self.log.open("ab") as output:
             process = start(arguments, self._workspace.folder, output, detached=True)
+        self._before = self._followed
         self._starting_s, self._process = time.monotonic(), process
         threading.Thread(
             target=self._reap, args=(process,), name="run end", daemon=True
@@ -211,9 +215,10 @@ class Supervisor:
         if self._status() is None:
             return
         for facts in watch(path, port=port):
-            if facts.get("pid") == os.getpid() or self._ending.is_set():
+            pid = facts.get("pid")
+            if pid in (os.getpid(), self._before) or self._ending.is_set():
                 return
-            self._starting_s = 0.0
+            self._starting_s, self._followed = 0.0, pid
             folder = facts.get("folder")
             if folder and Path(folder).parent == self._workspace.runs_path:
                 self.last_run = Path(folder).name
@@ -225,7 +230,9 @@ class Supervisor:
 
     def _reap(self, process: Any) -> None:
         process.wait()
-        self._starting_s = 0.0
+        if process is not self._process:
+            return  # the next run has begun
+        self._starting_s, self._before = 0.0, 0
         self._look_now.set()
         self._changed()
         if self._facts is None:

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from magbend.core.errors import ConfigError, InputError, StoreError
 from magbend.panel import Workspace
+from magbend.panel.runs import supervisor as supervisors
 from magbend.panel.runs.listing import run_detail
 from magbend.panel.runs.plan_file import check_plan, write_plan
 from magbend.panel.toml_edit import edited
@@ -83,6 +86,36 @@ def test_a_stop_reaches_a_run_that_has_not_said_a_word(panel: Served) -> None:
     wait_for(lambda: not panel.panel.supervisor.is_running)
     assert not panel.panel.workspace.runs_path.joinpath(name, "images").exists()
     wait_for(lambda: panel.panel.owner.parts is not None)
+
+
+def test_a_run_that_ends_late_is_not_taken_for_the_next_one(
+    panel: Served, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The stop was told to the process of the run before, and the new run went on."""
+    told: list[dict[str, Any]] = []
+    ended = [threading.Event(), threading.Event()]
+    waiting = iter([SimpleNamespace(wait=event.wait) for event in ended])
+    monkeypatch.setattr(supervisors, "start", lambda *_, **__: next(waiting))
+    monkeypatch.setattr("magbend.rig.watch", lambda *_, **__: iter(told))
+    monkeypatch.setattr("magbend.rig.ask", lambda *_, **__: told[0])
+    supervisor = supervisors.Supervisor(panel.panel.workspace, lambda: None)
+    others = set(threading.enumerate())
+    supervisor.start([], tmp_path / "first")
+    (first,) = set(threading.enumerate()) - others
+    told.append({"pid": 1})
+    supervisor._follow()
+    assert supervisor.facts == told[0]
+    supervisor._facts = None  # it is silent, but its process has not ended
+    supervisor.start([], tmp_path / "second")
+    supervisor._follow()
+    assert supervisor.facts is None
+    ended[0].set()
+    first.join(timeout=5.0)
+    assert supervisor.is_starting
+    told[0] = {"pid": 2}
+    supervisor._follow()
+    assert supervisor.facts == {"pid": 2}
+    ended[1].set()
 
 
 def test_a_run_outlives_the_panel_and_is_found_again(tmp_path: Path) -> None:
