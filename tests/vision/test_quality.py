@@ -12,9 +12,14 @@ import pytest
 from magbend.vision import as_photo, extract
 from magbend.vision.camera.calibration import scale_calibration
 from magbend.vision.curve.curve import Curve
-from magbend.vision.edge.clamp import DARKEST, ClampLines
+from magbend.vision.edge.clamp import ClampLines
 from magbend.vision.edge.crossings import EndFace
-from magbend.vision.extraction.quality import _front_in_shade, _goes_on, doubts
+from magbend.vision.extraction.quality import (
+    DARKEST,
+    _front_in_shade,
+    _goes_on,
+    doubts,
+)
 from magbend.vision.extraction.refine import refine
 from magbend.vision.extraction.setting import Setting
 from magbend.vision.extraction.strip import along_rod

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...core.jit import njit
 from ..curve.curve import Curve
-from ..curve.robust import median, quantiles
+from ..curve.robust import median
 from .crossings import Crossed, EndFace, crossings_of, line_through
 from .lanes import lanes_along
 from .levels import clear_of
@@ -41,11 +41,6 @@ and only what lies right beside the line makes the step."""
 _ALIKE = 1.9
 """Standard deviation of the face's place over what its lanes scatter, were they
 independent: they lie close together on the rod, and share their levels."""
-
-DARKEST, DIMMED = 0.15, 0.8
-"""How far from the rod's light to the paper's what goes on behind a root may be; and in
-a mix of colours, in which a clamp's shade on the rod takes from its colour and a dark
-clamp may look like paper."""
 
 _LENS = 0.05
 """Deviation of a blur in one picture from what others tell of it, in itself."""
@@ -264,21 +259,6 @@ def _front(
         crossing[first:last],
     )  # fmt: skip
     return crossed
-
-
-def is_dark_line(before: Array, behind: Array, darkest: float) -> bool:
-    """Whether the dark between two lighter sides is seen behind as it is before.
-
-    Of each, shape (5, n), the first and the last lane lie beside the rod. The middle
-    may be lighter by the part `darkest` of the way from rod to paper.
-    """
-    rod, paper = median(before[1:4].ravel()), median(before[::4].ravel())
-    if paper == rod:
-        return False
-    light = quantiles(behind, 0.5)
-    light = (light - rod) / (paper - rod)
-    lighter = min(light[0], light[4]) - max(light[1:4].max(), 0.0)
-    return bool(light[1:4].max() < darkest and lighter > 0.12)
 
 
 @njit(cache=True)

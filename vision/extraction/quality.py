@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..curve.robust import quantile
-from ..edge.clamp import DARKEST, DIMMED, is_dark_line
+from ..curve.robust import median, quantile, quantiles
 from ..edge.ends import APART_PX
 from ..edge.flank import WHITE
 from ..edge.levels import clear_of
@@ -53,6 +52,11 @@ AROUND = {OTHER_ROD, CLAMP_DOUBTFUL, TIP_GOES_ON}
 SAME_SD, LESS_SEEN = 2.0, 0.01
 """Deviations by which length and width may differ, and part of the rod that may be seen
 less well, with nothing across it."""
+
+DARKEST, DIMMED = 0.15, 0.8
+"""How far from the rod's light to the paper's what goes on behind a root may be; and in
+a mix of colours, in which a clamp's shade on the rod takes from its colour and a dark
+clamp may look like paper."""
 
 OVER_PAPER, OVER_PAPER_ROUGH = 1.0, 3.0
 """Widths of bare paper under an axis that are more than a speck, or than a gap in a
@@ -316,6 +320,21 @@ def _goes_on(strip: Strip, refined: Refined, face_px: float, darkest: float) -> 
     across = strip.lanes(-beside, -0.2, 0.0, 0.2, beside)
     before = across[:, strip.between(width, 3.0 * width)]
     return any(
-        is_dark_line(before, across[:, strip.between(-last, -first)], darkest)
+        _is_dark_line(before, across[:, strip.between(-last, -first)], darkest)
         for first, last in ((near, near + 0.2 * width), (width, 1.6 * width))
     )
+
+
+def _is_dark_line(before: Array, behind: Array, darkest: float) -> bool:
+    """Whether the dark between two lighter sides is seen behind as it is before.
+
+    Of each, shape (5, n), the first and the last lane lie beside the rod. The middle
+    may be lighter by the part `darkest` of the way from rod to paper.
+    """
+    rod, paper = median(before[1:4].ravel()), median(before[::4].ravel())
+    if paper == rod:
+        return False
+    light = quantiles(behind, 0.5)
+    light = (light - rod) / (paper - rod)
+    lighter = min(light[0], light[4]) - max(light[1:4].max(), 0.0)
+    return bool(light[1:4].max() < darkest and lighter > 0.12)
