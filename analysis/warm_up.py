@@ -10,18 +10,17 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
-import os
 import signal
 import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from multiprocessing.connection import wait
 from pathlib import Path
 
 import numpy as np
 
 from ..core.errors import SolverError
+from ..core.orphan import end_with_parent
 
 
 def stored() -> tuple[int, int]:
@@ -101,17 +100,9 @@ def _deaf() -> Iterator[None]:
 
 
 def _work(*jobs: Callable[[], None]) -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+    end_with_parent()
     for job in jobs:
         job()
-
-
-def _end_with(sentinel: int) -> None:
-    """End this process with its parent, however that is ended."""
-    wait([sentinel])
-    os._exit(1)
 
 
 def _rod() -> None:

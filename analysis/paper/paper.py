@@ -19,6 +19,7 @@ import numpy as np
 
 from ...core.errors import StoreError
 from ...core.files import output_folder
+from ...core.orphan import end_with_parent
 from ...core.progress import Progress, silent
 from ...sim import gmc
 from ..compare.compare import (
@@ -154,7 +155,9 @@ def _bench_runs(paths: Sequence[Path], *, seed: int, workers: int) -> Iterator[P
         return
     # Spawned, not forked: numba's and OpenCV's threads do not survive a fork.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+    with ProcessPoolExecutor(
+        workers, mp_context=context, initializer=end_with_parent
+    ) as pool:
         futures = [
             (path, pool.submit(bench_run, path, specimen=specimen, seed=hidden))
             for path, specimen, hidden in jobs

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
 from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
@@ -429,6 +431,19 @@ def test_a_dying_worker_does_not_lose_the_batch(tmp_path, folder, monkeypatch):
     monkeypatch.setattr("magbend.vision.batch.run.ProcessPoolExecutor", Dying)
     result = extract_files([folder], tmp_path / "out", setting=SETTINGS, workers=2)
     assert [row.status for row in result.frames] == ["failed", "ok", "ok"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs SIGKILL")
+def test_workers_end_with_a_batch_that_is_killed() -> None:
+    script = Path(__file__).with_name("batch_alone.py")
+    with subprocess.Popen(
+        [sys.executable, str(script)], text=True, stdout=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None
+        assert [process.stdout.readline() for _ in "ab"] == ["busy\n"] * 2
+        process.kill()
+        # Until nobody is left who could write:
+        process.communicate(timeout=20.0)
 
 
 def test_overlay_of_a_large_photograph_is_made_smaller():

@@ -17,6 +17,7 @@ import numpy as np
 
 from ...core import jit
 from ...core.jit import Kernel, once
+from ...core.orphan import end_with_parent
 from ..curve.fit import solution
 from ..curve.joints import _evidence, _model
 from ..curve.likelihood import penalised
@@ -74,6 +75,11 @@ def compile_kernels() -> None:
     measure(photo, replace(known, joints_mm=(10.0,)))
 
 
+def _compile_beside() -> None:
+    end_with_parent()
+    compile_kernels()
+
+
 def while_cold(
     work: Callable[[Task], Result], todo: Sequence[Task]
 ) -> Iterator[Result]:
@@ -93,7 +99,7 @@ def while_cold(
         if not _sample.cache_folder:
             return  # nothing would be kept of what another process compiles
         context = multiprocessing.get_context("spawn")
-        helper = context.Process(target=compile_kernels, daemon=True)
+        helper = context.Process(target=_compile_beside, daemon=True)
         helper.start()
     try:
         for task in todo:

@@ -20,6 +20,7 @@ from ...core.derived import note_derived
 from ...core.errors import ConfigError, MagbendError, VisionError
 from ...core.files import output_file, output_folder, write_bytes
 from ...core.json import read_json
+from ...core.orphan import end_with_parent
 from ...core.owned import owning_folder
 from ...core.progress import Progress, silent
 from ..camera.oriented import oriented
@@ -249,6 +250,7 @@ def _start_worker(task: _Task) -> None:
     cv2.setNumThreads(1)
     # Ctrl-C reaches every process of the terminal; the parent alone answers it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
 
 
 def _work(source: Source) -> Done:
