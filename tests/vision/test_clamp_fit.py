@@ -81,7 +81,7 @@ def test_a_front_askew_by_more_than_is_known_puts_its_place_in_doubt():
 
 
 def test_an_end_on_the_rod_that_no_front_checks_is_doubted_more():
-    end = EndFace(0.0, 0.03, 0.0, 0.05, 1.0, 0.3, 1.0)
+    end = EndFace(0.0, 0.1, 0.0, 0.15, 1.0, 0.3, 1.0)
     ends = SimpleNamespace(rise_along=np.zeros(2), along=np.full(2, 20.0))
 
     def place(front):

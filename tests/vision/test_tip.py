@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from magbend.vision.edge.clamp import ClampLines, between
 from magbend.vision.edge.crossings import EndFace, crossings_of, line_through
 from magbend.vision.edge.step_line import _solve, fit_step
 from magbend.vision.edge.tip import _rough_end
+from magbend.vision.extraction.root import SMEARED
 from magbend.vision.synthetic import (
     Block,
     Scene,
@@ -29,9 +31,11 @@ LOW, HIGH, BLUR = 0.1, 0.8, 1.1
 LINE = EndFace(s=0.0, sigma=0.0, skew=0.0, scatter=0.0, found=1.0)
 
 
-def lanes_over(place, skew, *, slope=0.0, noise=0.0, rng=None, blur=BLUR):
+def lanes_over(
+    place, skew, *, slope=0.0, noise=0.0, rng=None, blur=BLUR, across=ACROSS
+):
     """Blurred steps; the paper's light changes by `slope` per px behind them."""
-    t = S[None] - place - skew * ACROSS[:, None]
+    t = S[None] - place - skew * across[:, None]
     step = 0.5 * (1.0 + erf(t / blur / np.sqrt(2.0)))
     bell = blur * np.exp(-0.5 * (t / blur) ** 2) / np.sqrt(2.0 * np.pi)
     light = LOW + (HIGH - LOW) * step + slope * (t * step + bell)
@@ -96,16 +100,37 @@ def test_a_line_that_no_step_fits_is_no_surer_than_the_blur():
 def test_a_front_in_shade_that_is_not_straight_is_as_unsure_as_it_is_off(shade):
     light = lanes_over(0.0, 0.0)
     foot = light - shade * (light - LOW) * np.exp(-np.maximum(S, 0.0) / 3.0)
-    found, clean = (
-        fit_step(
-            line_through(seen, S, ACROSS, np.zeros(len(ACROSS))),
-            blur=BLUR, inner=4.0, outer=6.0, own=True,
-        )
-        for seen in (foot, light)
-    )  # fmt: skip
+    found, clean = front_of(foot), front_of(light)
     assert clean.s == pytest.approx(0.0, abs=0.003)
     assert clean.place_sd < 0.01
     assert 0.01 < abs(found.s) < 2.5 * found.place_sd
+
+
+def front_of(light, across=ACROSS):
+    seen = line_through(light, S, across, np.zeros(len(across)))
+    return fit_step(seen, blur=BLUR, inner=4.0, outer=6.0, own=True)
+
+
+def test_a_front_in_grain_that_four_lanes_share_is_as_unsure_as_it_says():
+    """As many as the fit counts for one: what is counted there must not be again."""
+    rng, beside = np.random.default_rng(2), np.linspace(10.0, 40.0, 13)
+    across = np.append(-beside[::-1], beside)
+    plain, inside = lanes_over(0.0, 0.0, across=across), []
+    for _ in range(400):
+        grain = rng.standard_normal((len(across) + 3, len(S)))
+        shared = sum(grain[k : len(across) + k] for k in range(4)) / 2.0
+        found = front_of(plain + 0.02 * shared, across)
+        inside.append(abs(found.s) < found.place_sd)
+    assert 0.62 < np.mean(inside) < 0.86
+
+
+@pytest.mark.parametrize("share", [0.03, 0.06, 0.12])
+def test_a_shade_in_one_step_with_a_front_moves_it_by_a_share_of_what_it_blurs(share):
+    front, shade = lanes_over(0.0, 0.0), lanes_over(1.0, 0.0)
+    found = front_of((1.0 - share) * front + share * shade)
+    more = math.sqrt(found.blur**2 - BLUR**2)
+    assert found.s == pytest.approx(math.sqrt(share / (1.0 - share)) * more, rel=0.1)
+    assert 0.5 * SMEARED * more < found.s < 1.5 * SMEARED * more
 
 
 def test_lines_at_the_clamp_weigh_as_their_steps_squared_and_as_they_are_seen():

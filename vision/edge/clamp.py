@@ -38,9 +38,9 @@ _CLAMP_SPAN = 3.0
 """So many blurs of the clamp are fitted: its foot and the corner over the rod are dark,
 and only what lies right beside the line makes the step."""
 
-_ALIKE = 1.9
+_ALIKE = 2.7
 """Standard deviation of the face's place over what its lanes scatter, were they
-independent: they lie close together on the rod, and share their levels."""
+independent: they lie close together on the rod, and share light, grain and levels."""
 
 _LENS = 0.05
 """Deviation of a blur in one picture from what others tell of it, in itself."""

@@ -12,13 +12,10 @@ from ...core.jit import njit
 
 Array = NDArray[np.float64]
 
-ALIKE = 1.4
-"""Standard deviation of a place over its lanes' own: they share shade and grain."""
-
 UNEVEN, BY_NOISE = 5.0, 0.5
-"""And over how far it moves with half as much more of the paper before it, by shade
-that is not straight: there is more such shade nearer by. Noise alone moves it by so
-much of the lanes' deviation."""
+"""Deviation of a place over how far it moves with half as much more of the paper before
+it, by shade that is not straight: there is more such shade nearer by. Noise alone moves
+it by so much of the lanes' deviation."""
 
 
 class EndFace(NamedTuple):
@@ -62,7 +59,7 @@ class EndFace(NamedTuple):
     def place_sd(self) -> float:
         """Standard deviation of the place, px."""
         uneven = max(self.uneven - BY_NOISE * self.sigma, 0.0)
-        return math.hypot(ALIKE * self.sigma, UNEVEN * uneven)
+        return math.hypot(self.sigma, UNEVEN * uneven)
 
 
 class Crossed(NamedTuple):

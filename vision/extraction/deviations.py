@@ -36,9 +36,9 @@ light is not known; where its lower edge is hidden."""
 PALE_TIP = 0.25
 """And in blurs, of a rod that is not dark."""
 
-LIMB = 0.09
-"""Of either side and of an end, in blurs, unless the rod is told to be square: the limb
-of a round one turns from the light, which is no step."""
+LIMB, LIMB_END = 0.09, 0.15
+"""Of either side, and of an end, in blurs, unless the rod is told to be square: the
+limb of a round one turns from the light, which is no step."""
 
 WIDTH_BLUR, WIDTH_SHADE, WIDTH_GROWTH = 0.01, 0.6, 1.2
 """Of a width: in blurs, which are no Gaussian's; the share of a shade's pull that is
@@ -53,7 +53,7 @@ that is not dark, and what of it is left in a dark rod's width."""
 PALE_PX = 0.2
 """Of a width that is not dark, whatever is seen of its sides."""
 
-SUPPLE, SUPPLE_FREEDOM = 1.25, 5.0
+SUPPLE, SUPPLE_FREEDOM = 1.5, 5.0
 """Of the direction at the clamp, over the fit's own, for a curve of so many free
 numbers, and with the root of more: they were chosen by the same points."""
 BENT_BACK, BACK, BENT = 1.5, 0.25, 0.01
@@ -137,9 +137,9 @@ def with_deviations(
     to_mm = np.array([1.0 / float(view.along[0]), 1.0])
     clamped = clamped * np.outer(to_mm, to_mm)
     clamp = math.sqrt(clamped[0, 0])
-    limb = LIMB * refined.blur if setting.is_round is not False else 0.0
-    tip = _tip_px(result, refined, view, dark=dark, limb=limb) / float(view.along[-1])
-    width = _width_px(result, refined, view, dark=dark, limb=limb) / median(view.across)
+    soft = 0.0 if setting.is_round is False else refined.blur
+    tip = _tip_px(result, refined, view, soft, dark=dark) / float(view.along[-1])
+    width = _width_px(result, refined, view, soft, dark=dark) / median(view.across)
     untold = math.hypot(EDGE_MM, _section_mm(result, view, setting))
     return replace(
         result,
@@ -151,25 +151,25 @@ def with_deviations(
 
 
 def _tip_px(
-    result: Measurement, refined: Refined, view: LocalView, *, dark: bool, limb: float
+    result: Measurement, refined: Refined, view: LocalView, soft: float, *, dark: bool
 ) -> float:
-    """Return the deviation of where the end is, px."""
+    """Return the deviation of where the end is, px; `soft` is the blur of a limb."""
     tip, rise = refined.tip, float(view.rise_along[-1])
     face = FACE_SEEN if rise < 0.0 or not dark else FACE_HIDDEN
     return math.hypot(
         ALIKE_TIP * tip.sigma,
         face * rise * result.width_mm,
         0.0 if dark else PALE_TIP * refined.blur,
-        limb,
+        LIMB_END * soft,
         white_px(refined),
         EDGE_MM * float(view.along[-1]),
     )
 
 
 def _width_px(
-    result: Measurement, refined: Refined, view: LocalView, *, dark: bool, limb: float
+    result: Measurement, refined: Refined, view: LocalView, soft: float, *, dark: bool
 ) -> float:
-    """Return the deviation of the width between the edges, px."""
+    """Return the deviation of the width between the edges, px; see `_tip_px`."""
     wall = WIDTH_FACE if dark else PALE_FACE
     return math.hypot(
         median(refined.sigma_width) / math.sqrt(max(1.0, _widths(refined))),
@@ -177,7 +177,7 @@ def _width_px(
         WIDTH_SHADE * median(refined.shaded),
         WIDTH_GROWTH * refined.growth,
         wall * median(np.abs(view.rise_across)) * result.width_mm,
-        2.0 * limb,
+        2.0 * LIMB * soft,
         2.0 * white_px(refined),
         WIDTH_FELT * refined.blur**4 / refined.typical_width**3,
     )

@@ -27,11 +27,13 @@ from .setting import UNKNOWN_CLAMP_MM, Setting
 HIDDEN_MM = 0.05
 """What part of the root a clamp of unknown height may hide before that is named."""
 
-BORDER_PX, CARRIED, SMEARED = 0.3, 0.002, 0.8
+BORDER_PX, CARRIED, SMEARED = 0.3, 0.002, 0.25
 """Standard deviation of a place: px, of where a rod enters the picture; as shares of
 how far a line is carried to the height of the axis, and of what blurs a line more than
-the rod's sides and its tip: the front of a shade, seen as one line with the clamp's
-(errors of 0.1 to 1 times that on most drawings)."""
+the rod's sides and its tip: the front of a shade, seen as one step with the clamp's. A
+step of which the part q belongs to another line is blurred by sqrt(q (1 - q)) of the
+way to that, and moved by q of it: by sqrt(q / (1 - q)) of what it is blurred more. The
+likeliest is q = 0.06; much of such blur is noise of the blur that is fitted."""
 
 UNCHECKED = 2.5
 """And over that of the rod's end on its own lanes where no front is seen beside it: the
@@ -105,12 +107,14 @@ def root_place(
     readings, axis_mm = [], setting.axis_height_mm
     if face is not None:
         at = _below(refined, face, axis_mm + rim_mm, setting)
-        readings.append(_Reading(at, _line_sd(refined, face), rim_mm * along))
+        sd = _line_sd(refined, face, seen=FACE_SEEN if front else math.inf)
+        readings.append(_Reading(at, sd, rim_mm * along))
     # A disc's rim is at no height that is known; the rod's own lanes are.
     if front is not None and not (is_round and face is not None):
         at = _below(refined, front, 0.0, setting)
         carried = (ROUND_CARRIED if is_round else CARRIED) * (at - front.s)
-        sd = _line_sd(refined, front, carried)
+        seen = FRONT_SEEN if face else math.inf
+        sd = _line_sd(refined, front, carried, seen=seen)
         readings.append(_Reading(at, sd, -axis_mm * along))
     if not readings:
         return RootPlace(s=0.0, sd=BORDER_PX)
@@ -177,15 +181,15 @@ def _hidden(
     return RootPlace(s=place, sd=sd, hidden=hidden)
 
 
-def _line_sd(refined: Refined, line: EndFace, *doubts: float) -> float:
-    """Return the deviation of a place that a line tells, with other doubts, px."""
-    clamp = refined.clamp
-    if clamp is None or clamp.front is None:
-        own = UNCHECKED * line.place_sd
-    elif clamp.face is None:
-        own = line.place_sd
-    else:
-        own = doubt_px(line, FRONT_SEEN if line is clamp.front else FACE_SEEN)
+def _line_sd(
+    refined: Refined, line: EndFace, *doubts: float, seen: float = math.inf
+) -> float:
+    """Return the deviation of a place that a line tells, with other doubts, px.
+
+    `seen` is over how many widths it is seen, if another line has to agree with it.
+    """
+    unchecked = refined.clamp is None or refined.clamp.front is None
+    own = (UNCHECKED if unchecked else 1.0) * doubt_px(line, seen)
     return math.hypot(own, SMEARED * smeared_px(refined, line.blur), *doubts)
 
 
