@@ -80,7 +80,7 @@ def fit_clamp(
     s = np.linspace(root.s, refined.tip.s, WALL_PLACES)
     view = setting.view(camera, *curve.at(s))
     wall = setting.wall_px(view, np.interp(s, curve.s, refined.width))
-    rod_sd = direction_rad(refined, np.interp(curve.s, s, wall), seen_in)
+    rod_sd = direction_rad(refined, root.s, np.interp(curve.s, s, wall), seen_in)
     heading = float(view.heading[0])
     turn, turn_sd = _front(refined, setting, camera, heading)
     # y runs down in the picture: there the heading turns the other way.

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..camera.calibration import Calibration
 from ..camera.projection import LocalView
+from ..curve.heading import sigma_heading, turned_without
 from ..curve.robust import median, quantile
 from ..find.ground import View
 from ..measurement import Measurement
@@ -60,6 +61,9 @@ BENT_BACK, BACK, BENT = 1.5, 0.25, 0.01
 """Factor for a rod that is bent both ways, the lesser way by this share at least, and
 by so much over its width: no single force makes that, and what is known of moments
 helps less at the root."""
+BESIDE = 1.0
+"""Widths beside the clamp without which a rod has another direction: what its shade
+does to two edges alike, or to what is seen of one, no other number tells."""
 TURN_SHADE, TURN_WALL, TURN_PALE_WALL = 0.35, 0.065, 0.4
 """Shares of the shade's pull, and of the side wall that is seen (on a rod that is not
 dark: its light is not known), by which the midline is off all along, with one sign."""
@@ -229,13 +233,15 @@ def _tip_sd_mm(
     return float(sd_x), float(sd_y)
 
 
-def direction_rad(refined: Refined, wall: Array, seen_in: View) -> float:
-    """Return the deviation of the rod's own direction at a place beside its clamp.
+def direction_rad(refined: Refined, root: float, wall: Array, seen_in: View) -> float:
+    """Return the deviation of the rod's own direction at its root.
 
     Parameters
     ----------
     refined : Refined
         The rod in pixels.
+    root : float
+        Where that is on its curve, px.
     wall : ndarray, shape (n,)
         How wide its side wall is seen, px, positive on the left.
     seen_in : View
@@ -253,8 +259,10 @@ def direction_rad(refined: Refined, wall: Array, seen_in: View) -> float:
     both = sorted((fit.curve.kappa.max(), -fit.curve.kappa.min()))
     free = BENT_BACK if both[0] > max(BACK * both[1], BENT / width) else 1.0
     supple = SUPPLE * math.sqrt(fit.freedom / SUPPLE_FREEDOM)
+    before = max(float(fit.curve.s[0]) - root, 0.0)
     return math.hypot(
-        free * supple * fit.sigma_theta[0],
+        free * supple * sigma_heading(fit, before),
+        turned_without(fit, before, BESIDE * width),
         free * fit.turned(np.hypot(drift, white), DRIFT_REACH * width),
         turned_by_shade(refined),
         facing * fit.lever @ wall,
