@@ -54,13 +54,13 @@ that is not dark, and what of it is left in a dark rod's width."""
 PALE_PX = 0.2
 """Of a width that is not dark, whatever is seen of its sides."""
 
-SUPPLE, SUPPLE_FREEDOM = 1.5, 5.0
+SUPPLE, SUPPLE_FREEDOM = 1.25, 5.0
 """Of the direction at the clamp, over the fit's own, for a curve of so many free
 numbers, and with the root of more: they were chosen by the same points."""
-BENT_BACK, BACK, BENT = 1.5, 0.25, 0.01
-"""Factor for a rod that is bent both ways, the lesser way by this share at least, and
-by so much over its width: no single force makes that, and what is known of moments
-helps less at the root."""
+ODD, BACK, LATE, BENT = 1.75, 0.25, 0.5, 0.01
+"""Factor for a rod that is bent as no single force bends it: both ways, the lesser way
+by this share at least, or its root by less than this share of its most; by so much over
+its width. What is known of moments helps less at the root then."""
 BESIDE = 1.0
 """Widths beside the clamp without which a rod has another direction: what its shade
 does to two edges alike, or to what is seen of one, no other number tells."""
@@ -256,8 +256,7 @@ def direction_rad(refined: Refined, root: float, wall: Array, seen_in: View) -> 
         bent * fit.curve.kappa * width, DRIFT_RELIT * _lit_at_clamp(refined, width)
     )
     white = DRIFT_WHITE * refined.saturated * refined.blur
-    both = sorted((fit.curve.kappa.max(), -fit.curve.kappa.min()))
-    free = BENT_BACK if both[0] > max(BACK * both[1], BENT / width) else 1.0
+    free = ODD if is_oddly_bent(fit.curve.kappa, width) else 1.0
     supple = SUPPLE * math.sqrt(fit.freedom / SUPPLE_FREEDOM)
     before = max(float(fit.curve.s[0]) - root, 0.0)
     return math.hypot(
@@ -267,6 +266,21 @@ def direction_rad(refined: Refined, root: float, wall: Array, seen_in: View) -> 
         turned_by_shade(refined),
         facing * fit.lever @ wall,
     )
+
+
+def is_oddly_bent(kappa: Array, width: float) -> bool:
+    """Whether no single force bends a rod so: both ways, or hardly at its root.
+
+    Parameters
+    ----------
+    kappa : ndarray, shape (n,)
+        Curvature from the root to the tip, per px.
+    width : float
+        Of the rod, px.
+    """
+    less, most = sorted((float(kappa.max()), float(-kappa.min())))
+    bent, root = BENT / width, abs(float(kappa[0]))
+    return less > max(BACK * most, bent) or (most > bent and root < LATE * most)
 
 
 def turned_by_shade(refined: Refined) -> float:
