@@ -7,6 +7,7 @@ the model fits, and in which direction it would fit better (a score test).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,16 @@ Array = NDArray[np.float64]
 
 NO_INFORMATION = 1e-6
 """Share of a column that must be left beside all others for the data to tell of it."""
+
+_OWN = ("photograph", "frame")
+_LOAD = ("remanence_percent", "side_percent", "magnet_percent", "meter_percent")
+"""Nuisances that a modulus is proportional to."""
+
+LARGEST_BIRGE = 4.0
+"""Beyond this the misfit of lines is told and not added to their errors."""
+
+FARTHEST = 10.0
+"""Deviations of their priors, or logarithms, that unknowns are never off by."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,6 +50,8 @@ class Linear:
         Residuals of all rows.
     is_noise : ndarray of bool, shape (n,)
         Rows that show the errors of lines, and not the model's.
+    line_rows : int
+        Of the data, those that are of lines: the first.
     noise_freedom : float
         Degrees of freedom in which the errors were measured.
     """
@@ -49,6 +62,7 @@ class Linear:
     basis: Array
     left: Array
     is_noise: NDArray[np.bool_]
+    line_rows: int
     noise_freedom: float
 
     @property
@@ -66,6 +80,34 @@ class Linear:
         """Degrees of freedom of `shape_chi2`."""
         free = int(np.sum(self.prior[:, 1] == 0.0))
         return max(1.0, float(np.sum(~self.is_noise)) - free)
+
+    @property
+    def unexplained(self) -> tuple[float, float]:
+        """Sum of squares that no value of any unknown explains, and its freedom.
+
+        Notes
+        -----
+        Of the low modes of the lines alone. Priors have no say: those that are wider
+        than a bench is off make `chi2` small, and hide lines that no rod can have.
+        """
+        low = ~self.is_noise
+        low[self.line_rows :] = False
+        basis, values, _ = np.linalg.svd(self.jacobian[low], full_matrices=False)
+        basis = basis[:, values > 1.0 / FARTHEST]
+        left = self.data[low] - basis @ (basis.T @ self.data[low])
+        return float(left @ left), float(len(left) - basis.shape[1])
+
+    @property
+    def birge(self) -> float:
+        """By what the errors of lines are larger, in variance, than their modes show.
+
+        Notes
+        -----
+        Birge's ratio, squared. What is beyond `LARGEST_BIRGE` is no error of lines any
+        more but that of a model, which the verdict tells.
+        """
+        chi2, freedom = self.unexplained
+        return min(max(1.0, chi2 / freedom), LARGEST_BIRGE) if freedom >= 1.0 else 1.0
 
     @property
     def information(self) -> Array:
@@ -107,6 +149,7 @@ def linear_problem(
         basis=basis,
         left=left - basis @ (basis.T @ left) if len(left) else left,
         is_noise=flags,
+        line_rows=sum(len(shot.modes) for shot in problem.shots),
         noise_freedom=max(3.0, float(np.sum(flags))),
     )
 
@@ -131,12 +174,17 @@ def statistical(problem: Problem, linear: Linear) -> Array:
 
     Only what a photograph errs in is free: its line, its clamp's place and direction.
     """
+    return linear.birge * _with(problem, linear, lambda name: scope_of(name) in _OWN)
+
+
+def of_shapes(problem: Problem, linear: Linear) -> Array:
+    """Return the covariance of the asked if the load were known: by shapes alone."""
+    return _with(problem, linear, lambda name: name not in _LOAD)
+
+
+def _with(problem: Problem, linear: Linear, is_free: Callable[[str], bool]) -> Array:
     p = len(problem.names)
-    own = [
-        p + k
-        for k, (name, _) in enumerate(problem.nuisances)
-        if scope_of(name) in ("photograph", "frame")
-    ]
+    own = [p + k for k, (name, _) in enumerate(problem.nuisances) if is_free(name)]
     keep = [*range(p), *own]
     return covariance_of(linear.information[np.ix_(keep, keep)], p)
 

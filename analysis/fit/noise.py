@@ -16,6 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
+from scipy.special import digamma
 
 Array = NDArray[np.float64]
 
@@ -74,15 +75,17 @@ def noise_mm(modes: Sequence[Array], stated: Sequence[float]) -> Array:
     Notes
     -----
     A mean of logarithms, weighted with their variances: 2 / n for a mean square of n
-    modes, `STATED_FACTOR` squared for the stated deviations.
+    modes, `STATED_FACTOR` squared for the stated deviations. The logarithm of a mean
+    square falls short of that of the variance, by log(n / 2) - digamma(n / 2).
     """
     own, weights = [], []
     for line in modes:
         rest = line[SHAPE:] / spectrum(len(line))[SHAPE:]
         weights.append(0.5 * len(rest))
         own.append(float(np.mean(rest**2)) if len(rest) else 1.0)
-    log_own = np.log(np.maximum(own, (0.1 * FLOOR_MM) ** 2))
     weight = np.array(weights)
+    short = np.log(np.maximum(weight, 0.5)) - digamma(np.maximum(weight, 0.5))
+    log_own = np.log(np.maximum(own, (0.1 * FLOOR_MM) ** 2)) + short
     claimed = 2.0 * np.log(np.maximum(stated, 1e-6))
     believed = 1.0 / (2.0 * math.log(STATED_FACTOR)) ** 2
     many = float(np.sum(weight))

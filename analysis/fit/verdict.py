@@ -1,8 +1,9 @@
 """Whether a fit can be believed, and which single change would explain its misfit.
 
-The p-value is that of two tests together: the misfit as a whole against the errors that
-the lines show (an F test), and the best of all single changes (score tests). If the
-model is right it is even between 0 and 1.
+The p-value is that of three tests together: the misfit as a whole and that of the lines
+alone, which no unknown explains, against the errors that the lines show (F tests), and
+the best of all single changes (score tests). If the model is right it is even between 0
+and 1.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from .linear import Linear
 from .models import better_models, compare_models
 from .records import Verdict
 from .result import FitResult
@@ -39,9 +41,13 @@ SERIOUS_FLAGS = (
 def judge(result: FitResult, limits: Limits) -> Verdict:
     """Return the verdict on a fit."""
     changes = scored(result)
-    whole = _p_of_misfit(result)
-    best = _p_of_best(result, [change.delta_chi2 for change in changes])
-    p_value = min(1.0, 2.0 * min(whole, best))
+    linear = result.linear
+    tests = (
+        _p_of_misfit(linear, linear.shape_chi2, linear.freedom),
+        _p_of_misfit(linear, *linear.unexplained),
+        _p_of_best(result, [change.delta_chi2 for change in changes]),
+    )
+    p_value = min(1.0, len(tests) * min(tests))
     flags: dict[str, int] = {}
     for shot in result.problem.shots:
         for flag in shot.flags:
@@ -74,9 +80,10 @@ def judge(result: FitResult, limits: Limits) -> Verdict:
     )
 
 
-def _p_of_misfit(result: FitResult) -> float:
-    linear = result.linear
-    return float(stats.f.sf(result.chi2_reduced, linear.freedom, linear.noise_freedom))
+def _p_of_misfit(linear: Linear, chi2: float, freedom: float) -> float:
+    if freedom < 1.0:
+        return 1.0
+    return float(stats.f.sf(chi2 / freedom, freedom, linear.noise_freedom))
 
 
 def _p_of_best(result: FitResult, gains: list[float]) -> float:

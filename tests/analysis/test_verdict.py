@@ -10,8 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from analysis_factory import write_run
+from numpy.polynomial.legendre import legval
 from scipy import stats
-from wrong_models import GAPS_MM, WRONG, all_off, bench_of, wrong_run
+from wrong_models import GAPS_MM, MAGNET, WRONG, Wrong, all_off, bench_of, wrong_run
 
 from magbend import sim
 from magbend.analysis import (
@@ -24,8 +25,10 @@ from magbend.analysis import (
 from magbend.analysis.fit.noise import MODES, mode_matrix, noise_mm, spectrum
 from magbend.analysis.fit.nuisance import NUISANCE_NAMES, Nuisance
 from magbend.analysis.fit.result import write_fit
-from magbend.analysis.twin.lines import lines_run
+from magbend.analysis.twin.bench import HiddenTruth, TwinBench
+from magbend.analysis.twin.lines import LineErrors, lines_run
 from magbend.core.errors import SolverError
+from magbend.core.specimen import Section, Specimen
 
 HELD = Nuisance(**dict.fromkeys(NUISANCE_NAMES, 0.0))
 
@@ -139,6 +142,47 @@ def test_a_stated_deviation_replaces_the_assumed_one() -> None:
     assert prior["remanence_percent"] == pytest.approx(20.0 / stated.remanence_mT)
     assert prior["natural_curvature_per_mm"] == 1e-5
     assert prior["magnet_percent"] == pytest.approx(1.3 / 1.305)
+
+
+def test_wide_priors_do_not_hide_lines_that_no_rod_can_have() -> None:
+    """A wave that turns round from photograph to photograph, 2.7 times their errors.
+
+    Everything else is within its prior: the misfit as a whole does not show it.
+    """
+    run, _ = wrong_run(Wrong(right=()), seed=311)
+    frames = {}
+    for k, (name, frame) in enumerate(run.frames.items()):
+        line = frame.centreline
+        wave = legval(2.0 * line.s_mm / line.length_mm - 1.0, [0.0, 0.0, 0.0, 1.0])
+        off_mm = 0.8e-3 * math.sqrt(7.0) * (-1) ** k * wave
+        waved = replace(
+            line,
+            x_mm=line.x_mm - off_mm * np.sin(line.theta_rad),
+            y_mm=line.y_mm + off_mm * np.cos(line.theta_rad),
+        )
+        frames[name] = replace(frame, centreline=waved)
+    for seen, supported in ((run.frames, True), (frames, False)):
+        verdict = fit_runs([replace(run, frames=seen)]).verdict
+        assert verdict is not None
+        assert (verdict.verdict == "supported") is supported
+
+
+def test_a_rod_found_too_soft_does_not_look_surer() -> None:
+    """One that hardly bends: its shape tells 1/E, whose errors are even."""
+    rod = Specimen(
+        name="one", side_mm=1.0, remanence_mT=20.0,
+        sections=(Section(length_mm=30.0, E_MPa=15.0),),
+    )  # fmt: skip
+    truth = HiddenTruth(specimen=rod, magnet=MAGNET, clamp_angle_deg=0.0)
+    z = []
+    for seed in range(40):
+        bench = TwinBench(rod, MAGNET, seed=seed, truth=truth)
+        errors = LineErrors(30.0, *[0.0] * 6)
+        run = lines_run(bench, (200.0,), np.random.default_rng([seed, 41]), errors)
+        fit = fit_runs([run], nuisance=HELD, judged=False)
+        z.append((fit.E_MPa[0] - 15.0) / fit.E_sd_MPa[0])
+    assert np.nanmax(np.abs(z)) < 3.0
+    assert np.nanmean(np.abs(z) < 1.0) > 0.68
 
 
 @pytest.mark.parametrize("size_um", [0.3, 5.0])
