@@ -227,11 +227,13 @@ def test_an_ok_is_queued_not_arrived(bench):
     assert all(board.seen[i + 1] == "M400" for i in moves)
 
 
-def test_a_restart_loses_the_position(bench):
+@pytest.mark.parametrize("said", ["start", "X:0.00 Y:0.0start", "\x7fstart"])
+def test_a_restart_loses_the_position(bench, said):
+    """Also one that cuts a line short, or comes with the noise of switching on."""
     board, stage, clock = bench
     stage.connect()
     stage.home()
-    board.say("start", board.now_s)
+    board.say(said, board.now_s)
     clock.sleep(0.1)
     with pytest.raises(PositionLostError):
         stage.goto_gap(60.0)

@@ -188,7 +188,7 @@ class MarlinSession:
         )
 
     def _note(self, line: str) -> None:
-        if line == "start":
+        if line.endswith("start"):  # a restart may cut a line short before it
             self.restarts += 1
             self.halted = False
         elif "kill() called" in line or "Printer halted" in line:
