@@ -102,5 +102,6 @@ def package(
     if json:
         print_json({"package": str(out), "files": files, "left_out": left_out})
         return
-    say(f"{out}: {files} files of {len(done)} runs")
+    many = "1 run" if len(done) == 1 else f"{len(done)} runs"
+    say(f"{out}: {files} files of {many}")
     tell_left_out(left_out, len(done))

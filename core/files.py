@@ -7,6 +7,7 @@ import errno
 import os
 import secrets
 import stat
+from collections.abc import Iterator
 from pathlib import Path
 
 from .errors import InputError
@@ -78,19 +79,35 @@ def write_bytes(path: Path, data: bytes) -> None:
     if path.exists() and not path.is_file():
         path.write_bytes(data)
         return
+    with beside(path) as temporary:
+        temporary.write_bytes(data)
+
+
+@contextlib.contextmanager
+def beside(path: Path) -> Iterator[Path]:
+    """Make an empty file beside `path`; what is written into it takes the place.
+
+    It is synced and renamed at the end. If anything fails it is removed, and what was
+    at `path` stays.
+
+    Raises
+    ------
+    OSError
+        Of writing, here or within: it names `path`.
+    """
     target = _behind_links(path)
     temporary = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
     try:
         with temporary.open("xb") as file:
             _keep_mode(file.fileno(), target)
-            file.write(data)
-            file.flush()
+        yield temporary
+        with temporary.open("rb+") as file:
             os.fsync(file.fileno())
         temporary.replace(target)
     except BaseException as error:
         with contextlib.suppress(OSError):
             temporary.unlink()
-        if isinstance(error, OSError):
+        if isinstance(error, OSError) and error.filename in (None, str(temporary)):
             error.filename, error.filename2 = str(path), None
             if isinstance(error, FileNotFoundError):
                 error.strerror = f"there is no folder {path.parent}; make it first"

@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from ...core.errors import InputError
-from ...core.files import output_file
+from ...core.files import beside, output_file
 from ...core.progress import Progress, silent
 from ..compare.compare import RunComparison
 from ..compare.export import export_runs
@@ -124,23 +124,21 @@ def _zip(
     runs: Sequence[RunComparison],
     progress: Progress,
 ) -> int:
-    temporary = out.with_name(f".{out.name}.tmp")
     entries = []
-    try:
-        with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive:
-            progress(0, len(files))  # what came before tells nothing of the rest
-            for count, (name, path) in enumerate(files, start=1):
-                entries.append(_add(archive, name, path))
-                progress(count, len(files))
-            data = _metadata(entries, description, runs)
-            for name, text in (
-                ("ro-crate-metadata.json", json.dumps(data, indent=1) + "\n"),
-                ("README.txt", _readme(entries, description, runs)),
-            ):
-                archive.writestr(zipfile.ZipInfo(name, _EPOCH), text)
-        temporary.replace(out)
-    finally:
-        temporary.unlink(missing_ok=True)
+    with (
+        beside(out) as temporary,
+        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED) as archive,
+    ):
+        progress(0, len(files))  # what came before tells nothing of the rest
+        for count, (name, path) in enumerate(files, start=1):
+            entries.append(_add(archive, name, path))
+            progress(count, len(files))
+        data = _metadata(entries, description, runs)
+        for name, text in (
+            ("ro-crate-metadata.json", json.dumps(data, indent=1) + "\n"),
+            ("README.txt", _readme(entries, description, runs)),
+        ):
+            archive.writestr(zipfile.ZipInfo(name, _EPOCH), text)
     return len(files) + 2
 
 

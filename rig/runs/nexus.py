@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...core.errors import StoreError
+from ...core.files import beside
 from .read import Run
 
 if TYPE_CHECKING:
@@ -35,16 +36,12 @@ def write_nexus(run: Run, path: Path) -> int:
         raise StoreError("NeXus files need h5py: pip install 'magbend[hdf5]'") from None
     if path.exists():
         raise StoreError(f"{path}: is there already; name another file")
-    partial = path.with_name(f".{path.name}.tmp")
     try:
-        with h5py.File(partial, "w") as file:
-            count = _fill(file, run)
-        partial.replace(path)
+        with beside(path) as temporary, h5py.File(temporary, "w") as file:
+            return _fill(file, run)
     except OSError as error:
-        raise StoreError(f"{path}: cannot be written: {error}") from None
-    finally:
-        partial.unlink(missing_ok=True)
-    return count
+        reason = error.strerror or error
+        raise StoreError(f"{path}: cannot be written: {reason}") from None
 
 
 def _fill(file: h5py.File, run: Run) -> int:

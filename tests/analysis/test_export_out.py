@@ -116,6 +116,20 @@ def test_a_package_describes_every_file_it_holds(tmp_path):
         assert entities["runs/gmc2/run.json"]["sha256"] in text
 
 
+def test_a_package_on_a_full_disk_is_named_and_leaves_nothing(
+    run, tmp_path, monkeypatch
+):
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("zipfile.ZipFile.writestr", full)
+    out = tmp_path / "full" / "paper.zip"
+    with pytest.raises(OSError, match="No space left") as failure:
+        write_package([run], out, Description(title="x"))
+    assert failure.value.filename == str(out)
+    assert not list(out.parent.iterdir())
+
+
 def test_a_package_lies_outside_its_runs_and_is_a_zip(run, tmp_path):
     with pytest.raises(InputError, match=r"must end in \.zip"):
         write_package([run], tmp_path / "a.tar", Description(title="x"))
