@@ -119,6 +119,19 @@ def test_a_line_at_another_height_is_known_no_better_than_the_camera_s_tilt():
     assert more == pytest.approx(np.radians(0.5) * 3.0 * 20.0)
 
 
+def test_a_line_seen_aslant_is_known_no_better_than_the_camera_s_height():
+    """A front on the paper, 3 mm below the axis, leans by 0.15 of that: 9 px."""
+    ends = SimpleNamespace(rise_along=np.full(2, -3.0), along=np.full(2, 20.0))
+
+    def sd(relative):
+        height = CAMERA.camera_height_mm
+        camera = replace(CAMERA, camera_height_sd_mm=relative * height)
+        setting = Setting(calibration=camera, rod_height_mm=3.0)
+        return root_place(straight_rod(None, LINE), ends, setting, 0.5).sd
+
+    assert np.sqrt(sd(0.05) ** 2 - sd(0.0) ** 2) == pytest.approx(0.05 * 9.0)
+
+
 def test_two_lines_under_one_tilt_tell_more_than_either():
     """The higher leans to one side by as much as the lower to the other."""
     tilt_sd, above = 0.01, np.array([30.0, -30.0])

@@ -2,10 +2,10 @@
 
 The clamp's front plane is seen at the top of the rod (its face) and at the paper (its
 front line), if the camera looks at it; else only the clamp's top edge is. Each line is
-carried to the height of the axis, and leans as the camera's tilt is in doubt. What both
-tell together is their least squares; where they disagree by more than they say, the
-place is known no better. If they do by far, one of them is of something else (a shade's
-border, a chamfer).
+carried to the height of the axis, and leans as the camera's tilt and height are in
+doubt. What both tell together is their least squares; where they disagree by more than
+they say, the place is known no better. If they do by far, one of them is of something
+else (a shade's border, a chamfer).
 """
 
 from __future__ import annotations
@@ -123,14 +123,14 @@ def root_place(
         if not is_face(apart, setting.face_px(refined.fit.curve)):
             return RootPlace(s=readings[0].s, sd=0.5 * abs(apart), apart=apart)
         readings, apart = readings[1:], 0.0
-    place, sd = together(readings, _tilt_sd(setting))
+    place, sd = together(readings, _lean_sd(setting, rise / along))
     return RootPlace(s=place, sd=sd, apart=apart)
 
 
 class _Reading(NamedTuple):
     """Where a line puts the root and how surely, and how high above the axis it is, px.
 
-    That is how far it leans where the camera is tilted by one radian more.
+    So far it is seen moved where what stands upright leans by one radian more.
     """
 
     s: float
@@ -138,15 +138,15 @@ class _Reading(NamedTuple):
     above: float
 
 
-def together(readings: Sequence[_Reading], tilt_sd: float) -> tuple[float, float]:
-    """Return place and deviation by least squares of what lines tell under one tilt.
+def together(readings: Sequence[_Reading], lean_sd: float) -> tuple[float, float]:
+    """Return place and deviation by least squares of what lines tell under one lean.
 
     Parameters
     ----------
     readings : sequence of tuple
         Place and deviation by each, and how high above the axis it lies, px.
-    tilt_sd : float
-        Standard deviation of the camera's tilt, rad.
+    lean_sd : float
+        Standard deviation of how what stands upright there is seen to lean, rad.
 
     Notes
     -----
@@ -154,15 +154,24 @@ def together(readings: Sequence[_Reading], tilt_sd: float) -> tuple[float, float
     Birge ratio; R. T. Birge, Phys. Rev. 40, 207, 1932).
     """
     s, sd, above = np.array(readings).T
-    sure = np.linalg.inv(np.diag(sd**2) + tilt_sd**2 * np.outer(above, above))
+    sure = np.linalg.inv(np.diag(sd**2) + lean_sd**2 * np.outer(above, above))
     place = float(sure.sum(axis=0) @ s / sure.sum())
     away = s - place
     return place, math.sqrt(max(1.0, float(away @ sure @ away)) / float(sure.sum()))
 
 
-def _tilt_sd(setting: Setting) -> float:
+def _lean_sd(setting: Setting, lean: float) -> float:
+    """Return how well it is known how far what stands upright is seen to lean, rad.
+
+    The camera's tilt is in doubt, and so is its height, over which things away from
+    right below it lean.
+    """
     camera = setting.calibration
-    return 0.0 if camera is None else math.radians(camera.tilt_sd_deg)
+    if camera is None:
+        return 0.0
+    by_height = lean * camera.camera_height_sd_mm / camera.camera_height_mm
+    tilt = math.radians(camera.tilt_sd_deg)
+    return math.hypot(tilt, by_height if math.isfinite(by_height) else 0.0)
 
 
 def _hidden(
@@ -170,13 +179,14 @@ def _hidden(
     share: float,
 ) -> RootPlace:  # fmt: skip
     """Return the root that a clamp's top hides, with the doubt of how far, a share."""
-    hidden = hidden_px(refined, setting, float(ends.rise_along[0])) / math.sqrt(3.0)
+    rise, along = float(ends.rise_along[0]), float(ends.along[0])
+    hidden = hidden_px(refined, setting, rise) / math.sqrt(3.0)
     place = _hidden_root(refined, ends, setting)
     if line is None:
         return RootPlace(s=place, sd=hidden, hidden=hidden)
     top = setting.clamp_height_mm
     above = 0.0 if top is None else top - setting.axis_height_mm
-    leant = _tilt_sd(setting) * above * float(ends.along[0])
+    leant = _lean_sd(setting, rise / along) * above * along
     sd = _line_sd(refined, line, share * (place - line.s), leant, hidden)
     return RootPlace(s=place, sd=sd, hidden=hidden)
 
