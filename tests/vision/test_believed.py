@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from magbend.vision.extraction.believed import better
+from magbend.vision.extraction.believed import better, is_elsewhere
+from magbend.vision.find.candidate import Candidate
 from magbend.vision.measurement import Measurement
 
 SMOOTH, ROUGH = ("shadow",), ("shadow", "rough_edges", "direction_doubtful")
@@ -15,7 +16,11 @@ def line(length_px, flags):
     """Return what was measured of a rod, 20 px wide, along one line."""
     x = np.linspace(100.0, 100.0 + length_px, 50)
     return Measurement(
-        status="ok", flags=flags, points={"x_px": x, "y_px": np.full(50, 80.0)},
+        status="ok", flags=flags,
+        points={
+            "x_px": x, "y_px": np.full(50, 80.0),
+            "right_x_px": x, "right_y_px": np.full(50, 90.0),
+        },
         length_px=length_px, width_px=20.0,
     )  # fmt: skip
 
@@ -29,3 +34,20 @@ def test_a_rod_with_less_doubt_is_believed_unless_an_end_of_it_is_missed(
 ):
     both = line(400.0, SMOOTH), line(400.0 + longer_px, ROUGH)
     assert better(*both[:: -1 if swapped else 1]).flags == flags
+
+
+@pytest.mark.parametrize(
+    ("y", "width", "elsewhere"),
+    [(80.0, 9.0, False), (85.5, 9.0, True), (85.0, 20.0, False), (92.0, 40.0, True)],
+    ids=["dim flanks", "shade at one side", "hardly aside", "side lost"],
+)
+def test_sides_that_reach_out_alike_beyond_a_rods_colour_are_its_own(
+    y, width, elsewhere
+):
+    x = np.linspace(100.0, 500.0, 40)
+    points = np.column_stack([x, np.full(40, y)])
+    rod = Candidate(
+        points_px=points, width_px=width, length_px=400.0, root="clamp", contacts=1,
+        ratio=0.5,
+    )  # fmt: skip
+    assert is_elsewhere(line(400.0, SMOOTH), rod) is elsewhere

@@ -112,10 +112,30 @@ def test_what_lies_between_two_bodies_is_held_at_neither():
     assert held(photo, part(axis)) is None
 
 
-def test_what_may_be_a_shade_is_not_asked():
-    shade = tuple(0.4 * level for level in PAPER)
-    photo, axis = scene(rod=shade, clamp=WHITE)
-    assert held(photo, part(axis)) is None
+@pytest.mark.parametrize(("share", "doubted"), [(0.4, True), (0.1, False)])
+def test_what_may_be_a_shade_is_held_in_doubt(share, doubted):
+    photo, axis = scene(rod=tuple(share * level for level in PAPER), clamp=WHITE)
+    assert held(photo, part(axis)).rivalled is doubted
+
+
+def test_a_rod_in_a_clamp_like_the_paper_is_found_beside_a_cable():
+    """What leads through the picture is no rod, as dark and long as it may be."""
+    photo, axis = scene(rod=BLACK, clamp=tuple(0.88 * level for level in PAPER))
+    light = photo.colour().copy()
+    cv2.line(light, (-20, 420), (900, 330), (0.02, 0.02, 0.02), 34, cv2.LINE_AA)
+    code = 255.0 * (1.055 * np.clip(light, 0.004, 1.0) ** (1 / 2.4) - 0.055)
+    found = extract(as_photo(np.rint(code).astype(np.uint8)), None)
+    assert found.ok, found.reason
+    assert "other_rod" in found.flags
+    points = np.column_stack([found.points["x_px"], found.points["y_px"]])
+    assert max(np.hypot(*(axis - point).T).min() for point in points[5:-5]) < 1.0
+
+
+def test_what_touches_a_body_at_one_end_is_not_held_at_the_other():
+    photo, axis = scene(rod=BLACK, clamp=WHITE)
+    whole = held(photo, part(axis))
+    assert whole.is_held_as(part(axis))
+    assert not whole.is_held_as(part(axis[::-1]))
 
 
 @pytest.mark.parametrize(

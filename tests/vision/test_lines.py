@@ -133,3 +133,17 @@ def test_nothing_is_looked_for_or_tried_twice(monkeypatch):
     assert len({id(rod.points_px) for rod in found}) == len(found) > 0
     levels = {(id(binary.ratio), binary.threshold) for binary in looked}
     assert len(levels) == len(looked) > 0
+
+
+def test_a_rod_thin_enough_to_go_with_the_lines_does_not_count_as_one():
+    """It is in few parts of the picture, the lines are in most."""
+    faint = tuple(1.35 * level for level in MAT)
+    photo, axis = mat(
+        rod=WHITE, line=faint, lines_px=4, pitch_px=90, rod_px=16, clamp=SKY
+    )
+    ground = ground_distance(photo)
+    unlined = without_lines(ground)
+    x, y = np.rint((axis[20:] + 0.5) / ground.factor - 0.5).astype(int).T
+    assert np.median((unlined.ratio - ground.ratio)[y, x]) > 0.3
+    left = beyond_lines(ground, unlined).ratio
+    assert left[left < 1.0].max() > 0.8  # lines are less than 0.15 from the mat

@@ -491,11 +491,13 @@ def test_a_front_that_shade_beside_the_root_leaves_unchecked_is_in_doubt(
     assert ("direction_doubtful" in found.flags) == alone
 
 
-def test_a_rod_wider_than_what_was_told_from_its_shade_is_in_doubt(monkeypatch):
+@pytest.mark.parametrize("aside", [0.0, 3.0 * WIDTH], ids=["both", "no rod"])
+def test_a_rod_wider_than_what_was_told_from_its_shade_is_in_doubt(monkeypatch, aside):
     """It may be rod and shade, or a rod of which a streak left but a rim."""
 
     def rim(_, candidate, width):
-        return replace(candidate, width_px=0.5 * width)
+        points = candidate.points_px + np.array([0.0, aside])
+        return replace(candidate, points_px=points, width_px=0.5 * width)
 
     photo = drawn(rod=BLACK, turn_deg=30.0)
     plain = extract(photo, SCALE)

@@ -17,9 +17,10 @@ from magbend.vision import (
     specimen_to_px,
 )
 from magbend.vision.edge.state import LostError
+from magbend.vision.find import choose
 from magbend.vision.find.candidate import Candidate
-from magbend.vision.find.choose import LEAST_LENGTH
-from magbend.vision.find.rivals import standing_out
+from magbend.vision.find.choose import LEAST_LENGTH, likely_rods
+from magbend.vision.find.rivals import is_shade, standing_out
 from magbend.vision.find.sought import Sought
 from magbend.vision.find.things import Thing, without_strokes
 from magbend.vision.synthetic import (
@@ -317,3 +318,32 @@ def test_a_line_that_is_shorter_and_thinner_is_no_rod_beside_another():
     found = standing_out([*lines, rod], Sought())
     assert found.points_px is rod.best.points_px
     assert found.rivalled
+
+
+def test_a_pale_rod_is_no_shade_of_a_wide_cable_across_the_picture():
+    """A shade lies near its rod, in widths of either."""
+    cable = thing((50.0, 120.0), (500.0, 60.0), 80.0).best
+    pale = replace(thing((50.0, 400.0), (420.0, 400.0), 16.0).best, ratio=0.8)
+    assert not is_shade(pale, replace(cable, ratio=0.4))
+    beside = pale.points_px + np.array([0.0, 40.0])
+    assert is_shade(pale, replace(pale, points_px=beside, ratio=0.4))
+
+
+def test_two_strokes_on_one_ground_do_not_hide_a_rod_in_a_clamp_on_another(monkeypatch):
+    rod = held(thing((50.0, 400.0), (420.0, 400.0), 18.0, bend=-90.0), levels=6).best
+
+    def two(*_):
+        raise LostError("two_rods", "there are two things like a rod in the picture")
+        yield
+
+    def one(*_):
+        yield rod
+
+    looks = [(two, None, None), (one, None, None)]
+    monkeypatch.setattr(choose, "_looks", lambda _photo: looks)
+    rods = likely_rods(None, Sought())
+    found = next(rods)
+    assert found.points_px is rod.points_px
+    assert found.rivalled
+    with pytest.raises(LostError, match="two things"):
+        next(rods)

@@ -22,6 +22,9 @@ AS_LONG, AS_LONG_PX = 0.05, 1.0
 """By how much the lengths of a rod between the same ends may differ in two lights, in
 widths and px."""
 
+_ELSEWHERE = 0.5
+"""How far from where a rod's colour has it a side is none of that rod, in widths."""
+
 _OUT, _BEYOND = 0.62, 2.0
 """Light at a side, from the rod's to that beyond it, by so many blurs, which is half at
 an edge and less in a shade: more is the paper's."""
@@ -91,6 +94,23 @@ def apart_from_colour(plain: Measurement, rod: Candidate) -> float:
 
     Colour tells sides less well, but knows no shade.
     """
+    aside, wider = _off_colour(plain, rod)
+    return (abs(aside) + abs(wider)) / rod.width_px
+
+
+def is_elsewhere(plain: Measurement, rod: Candidate) -> bool:
+    """Whether a side is none of the rod of a colour: that of a shade, say.
+
+    A shade lies at one side. What reaches out at both is the rod's own dim flanks,
+    whose colour is not seen.
+    """
+    aside, wider = _off_colour(plain, rod)
+    apart = abs(aside) + min(abs(aside), wider) if wider > 0.0 else abs(aside) - wider
+    return apart > _ELSEWHERE * rod.width_px
+
+
+def _off_colour(plain: Measurement, rod: Candidate) -> tuple[float, float]:
+    """Return how far sides lie to the right of a colour's, and outside of them, px."""
     points, n = plain.points, len(rod.points_px)
     axis = np.column_stack([points["x_px"], points["y_px"]])
     right = np.column_stack([points["right_x_px"], points["right_y_px"]])
@@ -98,9 +118,8 @@ def apart_from_colour(plain: Measurement, rod: Candidate) -> float:
     nearest = np.hypot(*(inner[:, None] - axis).T).argmin(axis=0)
     across = (right - axis)[nearest]
     across /= np.hypot(*across.T)[:, None]
-    aside = median(np.sum((inner - axis[nearest]) * across, axis=1))
-    wider = 0.5 * (plain.width_px - rod.width_px)
-    return (abs(aside) + abs(wider)) / rod.width_px
+    aside = median(np.sum((axis[nearest] - inner) * across, axis=1))
+    return aside, 0.5 * (plain.width_px - rod.width_px)
 
 
 def lies_out(photo: Photo, found: Measurement) -> bool:

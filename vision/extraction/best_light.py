@@ -16,7 +16,7 @@ from ..find.shadeless import in_its_colour, in_lightness
 from ..find.track import Start, start_curve
 from ..measurement import Measurement
 from ..picture.photo import Photo
-from .believed import apart_from_colour, doubted, lies_out
+from .believed import apart_from_colour, doubted, is_elsewhere, lies_out
 from .finish import FAR, ROUGHLY, finish
 from .setting import Setting
 from .streak import is_parted, whole_rod
@@ -34,9 +34,9 @@ SMOOTH = 0.12
 WANDER = 8.0
 """Blur, in jumps of the width, from which it is none of a yarn's."""
 
-AS_COLOURED, ELSEWHERE = 0.1, 0.5
-"""How far a side may be from where a rod's colour has it, in widths: so little that it
-is no shade's, and so much that it is no side of that rod."""
+AS_COLOURED = 0.1
+"""How far a side may be from where a rod's colour has it, in widths, that is no
+shade's."""
 
 
 class TooWideError(LostError):
@@ -96,12 +96,13 @@ def measure_candidate(
         if found is None:
             raise
         return found
-    apart = AS_COLOURED if seen.plain else apart_from_colour(plain, rod)
-    if found is not None and ("rough_edges" in plain.flags or apart > ELSEWHERE):
+    elsewhere = not seen.plain and is_elsewhere(plain, rod)
+    if found is not None and ("rough_edges" in plain.flags or elsewhere):
         return found
-    if lost is not None and apart > ELSEWHERE:
+    if lost is not None and elsewhere:
         raise lost
-    return plain if apart < AS_COLOURED else doubted(plain)
+    sure = not seen.plain and apart_from_colour(plain, rod) < AS_COLOURED
+    return plain if sure else doubted(plain)
 
 
 def _sharper(
@@ -138,12 +139,33 @@ def _measured_in(
         far = _far(strip)
     elif candidate.halved:
         candidate = replace(candidate, rivalled=True)
-    grey, sign = view.grey, view.sign
-    start = _start(grey, candidate, sign)
+    start = _start(view.grey, candidate, view.sign)
     soft = start.rough or far is not None
     alone = None if soft else rod_alone(strip, candidate, start.width)
-    if alone is not None:
-        candidate, start = alone, _start(grey, alone, sign)
+    if alone is None:
+        return _from_start(photo, setting, candidate, view, start, far)
+    try:
+        bare = _start(view.grey, alone, view.sign)
+        found = _from_start(photo, setting, alone, view, bare, far)
+    except LostError:  # it has no step to a shade
+        found = _from_start(photo, setting, candidate, view, start, far)
+    if found.width_px > BOTH * alone.width_px + ROUGHLY:
+        raise TooWideError(found)
+    return found
+
+
+def _from_start(
+    photo: Photo, setting: Setting, candidate: Candidate, view: View, start: Start,
+    far: tuple[float, float] | None,
+) -> Measurement:  # fmt: skip
+    """Measure a rod from where its edges are about.
+
+    Raises
+    ------
+    LostError
+        If there is nothing to vouch for.
+    """
+    grey = view.grey
     if far is not None:
         # Taken for sharp, such edges would be sought between too close levels, and seem
         # the sharper for it.
@@ -152,12 +174,9 @@ def _measured_in(
         # Strands, gaps and hairs blurred away, what is left is how much is rod.
         blur = SMOOTH * start.width
         grey = np.asarray(cv2.GaussianBlur(grey, (0, 0), blur))
-        smooth = _start(grey, candidate, sign, blur)
+        smooth = _start(grey, candidate, view.sign, blur)
         start = replace(smooth, rough=True, width=start.width)
-    result = finish(photo, replace(view, grey=grey), start, candidate, setting)
-    if alone is not None and result.width_px > BOTH * alone.width_px + ROUGHLY:
-        raise TooWideError(result)
-    return result
+    return finish(photo, replace(view, grey=grey), start, candidate, setting)
 
 
 def _far(strip: Strip) -> tuple[float, float] | None:

@@ -20,8 +20,8 @@ from ..find.sought import Sought
 from ..measurement import Measurement, failure
 from ..picture.photo import Photo
 from .bare import flattened
-from .believed import apart_from_colour, better, doubted, is_sure, is_whole
-from .best_light import ELSEWHERE, TooWideError, measure_candidate
+from .believed import better, doubted, is_elsewhere, is_sure, is_whole
+from .best_light import TooWideError, measure_candidate
 from .setting import Setting
 
 ASIDE = 1.8
@@ -147,7 +147,7 @@ def _seen(photo: Photo, setting: Setting, rod: Candidate, view: View) -> Measure
             raise lost from None
         told, seen = in_its_colour(photo, rod, view)
         by_colour = seen is not view and not seen.plain
-        if by_colour and apart_from_colour(found, told) > ELSEWHERE:
+        if by_colour and is_elsewhere(found, told):
             raise
         return found
 
@@ -166,7 +166,7 @@ def _from_front(
         told = lost.flag != "no_clamp" or rod.from_front
         whole = None if told else held(photo, rod)
         with suppress(LostError):
-            if whole is not None:
+            if whole is not None and whole.is_held_as(rod):
                 return measure_candidate(photo, setting, whole, view)
         raise
 

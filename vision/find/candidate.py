@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -86,6 +87,13 @@ class Candidate:
             root=held if self.is_held_at_end else "free",
             leaves=self.root == "border",
         )
+
+    def is_held_as(self, other: Candidate) -> bool:
+        """Whether it begins at that end of another at which that begins."""
+        first, last = (
+            math.dist(self.points_px[0], other.points_px[k]) for k in (0, -1)
+        )
+        return first < last
 
     def away(self, point: Array) -> float:
         """Distance of a point (x, y) from the start curve, px."""

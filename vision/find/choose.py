@@ -20,7 +20,7 @@ from .ground import (
     ground_distance,
     other_ground,
 )
-from .held import as_held
+from .held import as_held, held
 from .lines import beyond_lines, without_lines
 from .rivals import TOLD, alike, are_halves, bound, standing_out, too_many
 from .rod import LEAST_SHARE, find_candidates
@@ -39,6 +39,9 @@ _Finder = Callable[[Photo, Sought, Levels], Iterator[Candidate]]
 
 _GROUNDS = 3
 """Grounds that things are told from, one after the other."""
+
+_ASKED = 6
+"""Things of which it is asked whether a clamp holds them that their light hides."""
 
 LEAST_LENGTH, LEAST_HELD = 0.08, 0.045
 """Shortest rod, in diagonals of the picture: below that it is dust, hair or print; and
@@ -104,11 +107,10 @@ def likely_rods(photo: Photo, sought: Sought) -> Iterator[Candidate]:
                 if any(rod.points_px is points for points in seen):
                     continue
                 if rod.root == "clamp" or not seen:
-                    yield replace(rod, rivalled=rod.rivalled or bool(seen))
+                    told = not seen and several is None
+                    yield replace(rod, rivalled=rod.rivalled or not told)
                 seen.append(rod.points_px)
         except LostError as lost:
-            if lost.flag == "two_rods":
-                raise
             several = several or lost
     if several is not None:
         raise several
@@ -154,16 +156,17 @@ def _in_picture(photo: Photo, sought: Sought, picture: Levels) -> Iterator[Candi
                 yield other.best
         if rod.root == "clamp" and rod.contacts == 1:
             return
-    held = _held(things)  # what leads through the picture is a cable
-    if held:
-        yield standing_out(_without_shades(photo, held), sought)
+    clamped = _held(photo, things)  # what leads through the picture is a cable
+    if clamped:
+        yield standing_out(_without_shades(photo, clamped), sought)
 
 
 def _short(photo: Photo, sought: Sought, picture: Levels) -> Iterator[Candidate]:
     """Yield what is short in one picture, and which a clamp holds."""
-    held = _held(_things(photo, sought, picture, LEVELS, LEAST_HELD))
-    if held:
-        yield standing_out(_without_shades(photo, held), sought)
+    things = _things(photo, sought, picture, LEVELS, LEAST_HELD)
+    clamped = _held(photo, things)
+    if clamped:
+        yield standing_out(_without_shades(photo, clamped), sought)
 
 
 def seen_best(photo: Photo, sought: Sought, rod: Candidate) -> tuple[Candidate, View]:
@@ -205,13 +208,23 @@ def _things(
     return [thing for thing in things if sought.fits(thing.best)] or things
 
 
-def _held(things: list[Thing]) -> list[Thing]:
-    """Return those that a clamp holds at one end, and nothing at the other."""
-    return [
+def _held(photo: Photo, things: list[Thing]) -> list[Thing]:
+    """Return those that a clamp holds at one end, and nothing at the other.
+
+    Else those of the likeliest that one holds which their own light does not show: as
+    half of the levels at which they float see them; at the last, shade may join them.
+    """
+    found = [
         thing
         for thing in things
         if thing.best.root == "clamp" and thing.best.contacts == 1
     ]
+    for thing in [] if found else things[:_ASKED]:
+        floating = [item for item in thing.seen if not item.contacts]
+        whole = held(photo, floating[len(floating) // 2]) if floating else None
+        if whole is not None:
+            found.append(replace(thing, seen=[whole, *floating]))
+    return found
 
 
 def _without_shades(photo: Photo, things: list[Thing]) -> list[Thing]:

@@ -120,6 +120,7 @@ def held(photo: Photo, rod: Candidate) -> Candidate | None:
     return replace(
         rod, points_px=points, length_px=float(arc_lengths(points)[-1]),
         root="clamp", contacts=1, leaves=False, from_front=True,
+        rivalled=rod.rivalled or front.is_shade,
     )  # fmt: skip
 
 
@@ -141,7 +142,7 @@ class _End(NamedTuple):
     def is_front(self) -> bool:
         """Whether it is the front of a clamp."""
         clear = self.change > _FRONT and self.sure > _SURE
-        return clear and self.one_body and not self.is_shade
+        return clear and self.one_body
 
 
 def _end_at(photo: Photo, points: Array, width: float) -> _End:

@@ -65,8 +65,14 @@ def beyond_lines(binary: Binary, unlined: Binary) -> Binary:
     binary, unlined : Binary
         The picture, and the same without its lines.
     """
-    taken = (unlined.ratio - binary.ratio)[::2, ::2]
-    lines = np.quantile(taken[taken > _SEEN], _DARKEST) + _MORE
+    taken = np.array_split((unlined.ratio - binary.ratio)[::2, ::2], _TILES)
+    tiles = (tile for row in taken for tile in np.array_split(row, _TILES, axis=1))
+    darkest = [
+        np.quantile(tile[tile > _SEEN], _DARKEST)
+        for tile in tiles
+        if np.mean(tile > _SEEN) > _FULL
+    ]
+    lines = np.median(darkest) + _MORE  # a rod is in few of them
     alone = np.where(binary.ratio > 1.0 - lines, np.float32(1.0), binary.ratio)
     return replace(binary, ratio=np.asarray(alone, np.float32))
 

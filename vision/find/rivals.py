@@ -30,7 +30,7 @@ _STROKE, _THINNER = 0.4, 0.5
 
 _SHADE, _BESIDE = 0.65, 8.0
 """Contrast of a shade over that of its rod, at most; and how far it may lie from the
-rod, in widths."""
+rod, in widths of the thinner."""
 
 _HALVES = 2.5
 """Distance between the axes of two halves of a rod that a streak of gloss parts, at
@@ -84,7 +84,7 @@ def standing_out(things: list[Thing], sought: Sought) -> Candidate:
         if not sought.tells(first.best, other.best, TOLD)
     ]
     halved = any(are_halves(first.best, other.best) for other in things)
-    rivalled = bool(rivals or longer)
+    rivalled = first.best.rivalled or bool(rivals or longer)
     rod = replace(first.best, rivalled=rivalled, halved=halved)
     as_likely = [
         other.best
@@ -117,7 +117,7 @@ def is_shade(one: Candidate, rod: Candidate) -> bool:
         return False
     alike = 0.4 < one.length_px / rod.length_px < 2.0
     away = [rod.away(point) for point in one.points_px[:: len(one.points_px) // 8 + 1]]
-    return alike and max(away) < _BESIDE * rod.width_px
+    return alike and max(away) < _BESIDE * min(one.width_px, rod.width_px)
 
 
 def are_halves(one: Candidate, other: Candidate) -> bool:
