@@ -147,7 +147,10 @@ def _measured_in(
     try:
         bare = _start(view.grey, alone, view.sign)
         found = _from_start(photo, setting, alone, view, bare, far)
-    except LostError:  # it has no step to a shade
+    except LostError as lost:
+        if lost.flag != "edges_lost":
+            raise
+        # What was told from it has no edges, and was no rod.
         found = _from_start(photo, setting, candidate, view, start, far)
     if found.width_px > BOTH * alone.width_px + ROUGHLY:
         raise TooWideError(found)
