@@ -134,16 +134,18 @@ def position_at(centreline: Centreline, s_mm: Array) -> tuple[Array, Array]:
     x_mm, y_mm : ndarray, shape (n,)
     """
     s = centreline.s_mm
-    wanted = np.clip(s_mm, s[0], s[-1])
-    i = np.clip(np.searchsorted(s, wanted, side="right") - 1, 0, len(s) - 2)
-    h = s[i + 1] - s[i]
+    wanted = np.minimum(np.maximum(s_mm, s[0]), s[-1])
+    i = np.searchsorted(s[1:-1], wanted, side="right")
+    j = i + 1
+    h = s[j] - s[i]
     t = (wanted - s[i]) / h
-    h00, h01 = (1.0 + 2.0 * t) * (1.0 - t) ** 2, t * t * (3.0 - 2.0 * t)
-    h10, h11 = t * (1.0 - t) ** 2 * h, t * t * (t - 1.0) * h
-    slopes = np.cos(centreline.theta_rad), np.sin(centreline.theta_rad)
+    left = 1.0 - t
+    h01 = t * t * (3.0 - 2.0 * t)
+    h10, h11 = t * left * left * h, t * t * left * h
+    x, y, theta = centreline.x_mm, centreline.y_mm, centreline.theta_rad
     x_mm, y_mm = (
-        h00 * p[i] + h10 * m[i] + h01 * p[i + 1] + h11 * m[i + 1]
-        for p, m in zip((centreline.x_mm, centreline.y_mm), slopes, strict=True)
+        p[i] + h01 * (p[j] - p[i]) + h10 * m[i] - h11 * m[j]
+        for p, m in ((x, np.cos(theta)), (y, np.sin(theta)))
     )
     return x_mm, y_mm
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 from ... import sim
@@ -46,7 +47,11 @@ def field_at(field: sim.Field, gap_mm: float, values: Values) -> sim.Field:
         true_mT /= 1.0 + values.get("meter_percent", 0.0) / 100.0
         return replace(field, flux_mT=true_mT)
     gap_mm += values.get("gap_mm", 0.0)
-    along_mm = values.get("magnet_offset_mm", 0.0)
+    return _shifted(field, gap_mm, values.get("magnet_offset_mm", 0.0))
+
+
+@lru_cache(maxsize=256)  # most derivatives leave it where it is
+def _shifted(field: sim.Field, gap_mm: float, along_mm: float) -> sim.Field:
     return sim.Field(_moved(one, gap_mm, along_mm) for one in field.sources)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import sim
+from ...core.centreline import Centreline
 from ...core.cross_section import ALL_SIZES
 from ...core.errors import InputError, MagbendError
 from ...core.specimen import Section, Specimen
@@ -69,14 +70,21 @@ def solved_mm(
         field = sim.UniformField(flux_mT=flux_mT, angle_deg=angle_deg)
     # Only a straight rod can be solved as a solid.
     solid = problem.model == "solid" and specimen.is_plain
-    shape = sim.solve(
-        specimen, field, support=_support_of(problem, shot, values),
-        model="solid" if solid else "rod", points=241,
-    ).centreline  # fmt: skip
+    support = _support_of(problem, shot, values)
+    shape = _solved(specimen, field, support, "solid" if solid else "rod")
     if shape is None:
         return None
     # A measured line may be a little longer than the rod, never asked beyond its tip.
     return np.column_stack(position_at(shape, shot.line.s_mm))
+
+
+@lru_cache(maxsize=1024)  # not all that changes a line as it is seen changes the rod
+def _solved(
+    specimen: Specimen, field: sim.Field, support: sim.Support, model: str
+) -> Centreline | None:
+    return sim.solve(
+        specimen, field, support=support, model=model, points=241
+    ).centreline
 
 
 def with_bow(problem: Problem, unknowns: Array) -> Problem:
@@ -166,7 +174,7 @@ def rod_of(nominal: Specimen, values: Values) -> Specimen:
     return _changed(nominal, tuple(own))
 
 
-@lru_cache(maxsize=64)  # most derivatives, and all photographs, share their rods
+@lru_cache(maxsize=512)  # most derivatives, and all photographs, share their rods
 def _changed(nominal: Specimen, changes: tuple[tuple[str, float], ...]) -> Specimen:
     values = dict(changes)
     count = len(nominal.sections)
