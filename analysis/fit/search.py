@@ -20,9 +20,16 @@ from .residuals import WALL, misfit, residuals
 
 Array = NDArray[np.float64]
 
-NEARBY, CLOSE = 5.0, 1e-4
-"""Steps, in prior standard deviations or logarithms, beyond which a start was not
-nearly right, and under which a search has ended."""
+NEARBY, FRESH, CLOSE = 30.0, 3e-2, 1e-8
+"""Steps, in prior standard deviations or logarithms: beyond the first a start was not
+nearly right, under the second derivatives are those of the end, under the third a
+search has ended."""
+
+ROUGH = 1e-3
+"""Relative change of the sum of squares, or of the unknowns, that is near enough."""
+
+ROUNDS = 6
+"""How many times Gauss-Newton may take derivatives anew."""
 
 AT_BOUND = 1e-3
 """Relative distance from a bound from which on a modulus lies on it."""
@@ -107,16 +114,78 @@ def _turn(problem: Problem, limits: Limits) -> _Turn:
 def search(problem: Problem, limits: Limits, begin: Array | None = None) -> Array:
     """Return the unknowns with the least sum of squares.
 
+    Gauss-Newton where the start is nearly right; else Levenberg-Marquardt comes near.
+
     Raises
     ------
     SolverError
         If the search does not converge.
     """
+    begin = np.zeros(problem.size) if begin is None else begin
+    if limits.falling or limits.bounds_MPa is not None:
+        return _levenberg(problem, limits, begin, CLOSE)
+    found = _gauss_newton(problem, limits, begin)
+    if found is None:
+        near = _levenberg(problem, limits, begin, ROUGH)
+        found = _gauss_newton(problem, limits, near)
+    return _levenberg(problem, limits, begin, CLOSE) if found is None else found
+
+
+def _weak(prior: Array) -> Array:
+    """Return the rows of the priors, and weak ones where there is none.
+
+    Too weak to be seen, these keep a search from wandering off along a direction in
+    which nothing changes.
+    """
+    return np.diag(np.maximum(prior[:, 1], 0.01))
+
+
+def _gauss_newton(problem: Problem, limits: Limits, begin: Array) -> Array | None:
+    """Search by steps with derivatives that are kept while the steps shrink.
+
+    Old ones lead to where they would be right: they end a search only where the first
+    step with them was small. None where the steps do not shrink.
+    """
+    prior = priors(problem, limits)
+    rows = _weak(prior)
+    unknowns = np.array(begin)
+    try:
+        for _ in range(ROUNDS):
+            data, slopes = residuals(problem, unknowns)
+            back = np.linalg.pinv(np.vstack([slopes, rows]))
+            sizes: list[float] = []
+            while np.max(np.abs(data)) < WALL:
+                step = -back @ np.concatenate([data, rows @ (unknowns - prior[:, 0])])
+                size = float(np.max(np.abs(step)))
+                if not size < (0.5 * sizes[-1] if sizes else NEARBY):
+                    break
+                unknowns = unknowns + step
+                sizes.append(size)
+                if size < (CLOSE if sizes[0] < FRESH else FRESH):
+                    break
+                data = misfit(problem, unknowns)
+            if not sizes:
+                return None
+            if sizes[-1] < CLOSE:
+                return unknowns
+    except MagbendError:
+        return None
+    return None
+
+
+def _levenberg(
+    problem: Problem, limits: Limits, begin: Array, tolerance: float
+) -> Array:
+    """Search within the limits by Levenberg-Marquardt.
+
+    Raises
+    ------
+    SolverError
+        If it does not converge.
+    """
     prior = priors(problem, limits)
     turn = _turn(problem, limits)
-    # Too weak to be seen, these rows keep the search from wandering off along a
-    # direction in which nothing changes.
-    rows = np.diag(np.maximum(prior[:, 1], 0.01))
+    rows = _weak(prior)
 
     def evaluate(v: Array) -> tuple[Array, Array]:
         u = turn.matrix @ v + turn.offset
@@ -126,7 +195,6 @@ def search(problem: Problem, limits: Limits, begin: Array | None = None) -> Arra
             np.vstack([slopes, rows]) @ turn.matrix,
         )
 
-    begin = np.zeros(problem.size) if begin is None else begin
     start = np.linalg.solve(turn.matrix, begin - turn.offset)
     start = np.clip(start, turn.lower + 1e-3, turn.upper - 1e-3)
     cache: dict[bytes, tuple[Array, Array]] = {}
@@ -159,9 +227,9 @@ def search(problem: Problem, limits: Limits, begin: Array | None = None) -> Arra
         bounds=(turn.lower, turn.upper),
         method="trf" if bounded else "lm",
         x_scale="jac" if bounded else 1.0,
-        xtol=1e-8,
-        ftol=1e-8,
-        gtol=1e-8,
+        xtol=tolerance,
+        ftol=tolerance,
+        gtol=tolerance,
         max_nfev=200,
     )
     if found.status <= 0 or np.max(np.abs(found.fun)) >= WALL:
@@ -170,37 +238,6 @@ def search(problem: Problem, limits: Limits, begin: Array | None = None) -> Arra
             "is it the right specimen, with the right sign of its remanence?"
         )
     return np.asarray(turn.matrix @ found.x + turn.offset)
-
-
-def nearby(problem: Problem, limits: Limits, begin: Array) -> Array:
-    """Return the same as `search` from a start that is nearly right, at less cost.
-
-    Gauss-Newton steps with derivatives that are kept as long as the steps shrink.
-
-    Raises
-    ------
-    SolverError
-        If the search does not converge.
-    """
-    if limits.falling or limits.bounds_MPa is not None:
-        return search(problem, limits, begin)
-    prior = priors(problem, limits)
-    rows = np.diag(np.maximum(prior[:, 1], 0.01))
-    unknowns = np.array(begin)
-    for _ in range(3):
-        _, slopes = residuals(problem, unknowns)
-        back = np.linalg.pinv(np.vstack([slopes, rows]))
-        before = np.inf
-        for _ in range(10):
-            data = [misfit(problem, unknowns), rows @ (unknowns - prior[:, 0])]
-            step = -back @ np.concatenate(data)
-            size = float(np.max(np.abs(step)))
-            if not size < min(0.7 * before, NEARBY):
-                break
-            unknowns, before = unknowns + step, size
-            if size < CLOSE:
-                return np.asarray(unknowns)
-    return search(problem, limits, begin)
 
 
 def on_bounds(problem: Problem, limits: Limits, unknowns: Array) -> tuple[str, ...]:

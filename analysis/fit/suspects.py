@@ -22,7 +22,7 @@ from .problem import Problem, with_prior
 from .records import Suspect
 from .residuals import residuals
 from .result import FitResult, result_of
-from .search import Limits, nearby, on_bounds, priors
+from .search import Limits, on_bounds, priors, search
 
 Array = NDArray[np.float64]
 
@@ -121,7 +121,7 @@ def _refit(result: FitResult, limits: Limits, change: Suspect) -> Suspect | None
 def alternative(problem: Problem, limits: Limits, begin: Array) -> FitResult | None:
     """Fit another model to the same lines with the same errors; None if that fails."""
     try:
-        unknowns = nearby(problem, limits, begin)
+        unknowns = search(problem, limits, begin)
         return result_of(
             problem,
             priors(problem, limits),

@@ -24,7 +24,10 @@ from magbend.analysis import (
 )
 from magbend.analysis.fit.noise import MODES, mode_matrix, noise_mm, spectrum
 from magbend.analysis.fit.nuisance import NUISANCE_NAMES, Nuisance
+from magbend.analysis.fit.problem import with_prior
+from magbend.analysis.fit.residuals import residuals
 from magbend.analysis.fit.result import write_fit
+from magbend.analysis.fit.search import Limits, priors, search
 from magbend.analysis.twin.bench import HiddenTruth, TwinBench
 from magbend.analysis.twin.lines import LineErrors, lines_run
 from magbend.core.errors import SolverError
@@ -183,6 +186,19 @@ def test_a_rod_found_too_soft_does_not_look_surer() -> None:
         z.append((fit.E_MPa[0] - 15.0) / fit.E_sd_MPa[0])
     assert np.nanmax(np.abs(z)) < 3.0
     assert np.nanmean(np.abs(z) < 1.0) > 0.68
+
+
+def test_a_search_ends_where_its_derivatives_ask_for_no_step() -> None:
+    """Derivatives of its start would end it elsewhere, where much is left over."""
+    run, _ = wrong_run(WRONG["smooth stiffness gradient"], seed=101)
+    fit = fit_runs([run], judged=False)
+    wide = with_prior(fit.problem, "remanence_profile_percent", 0, 30.0)
+    limits = Limits()
+    found = search(wide, limits, np.append(fit.unknowns, 0.0))
+    data, slopes = residuals(wide, found)
+    rows = np.diag(priors(wide, limits)[:, 1])
+    step = np.linalg.pinv(np.vstack([slopes, rows])) @ [*data, *(rows @ found)]
+    assert np.max(np.abs(step)) < 0.02
 
 
 @pytest.mark.parametrize("size_um", [0.3, 5.0])
