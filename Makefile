@@ -19,7 +19,7 @@ demo: $(VENV)/.ready
 	$(BIN)/magbend demo --out $(OUT)
 
 test: $(VENV)/.ready-test
-	$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder -q
+	$(BIN)/python -m pytest -n 4 --dist loadfile --no-loadscope-reorder -q
 
 check: $(VENV)/.ready-test
 	$(BIN)/ruff check .
