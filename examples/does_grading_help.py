@@ -279,7 +279,7 @@ def table(found: dict) -> str:
 if __name__ == "__main__":
     out = Path(sys.argv[1] if len(sys.argv) > 1 else "gallery")
     out.mkdir(parents=True, exist_ok=True)
-    print(table(main(out)))
+    print(table(main(out)), flush=True)
     for task in TASKS:
         for best in (best_like(gmc(2), task), designed(gmc(2), task)):
             moduli = " ".join(f"{s.E_MPa:.1f}" for s in best.sections)
@@ -288,5 +288,6 @@ if __name__ == "__main__":
             print(
                 f"{task}, {best.name}: {lengths} mm of {moduli} MPa, push "
                 f"{one.push_mN:.2f} mN, root {one.root_per_mm:.4f} /mm, walls "
-                f"{one.wall_mN:.1f} mN"
+                f"{one.wall_mN:.1f} mN",
+                flush=True,
             )

@@ -32,10 +32,10 @@ from ...core.specimen import Specimen
 from ...core.specimen_file import MagnetModel, read_specimen, specimen_dict
 from ...core.toml import read_toml
 from ...rig import SCHEMA, RunFolder, sha256_of, utc_now
-from ...sim import axis_share
 from ...vision import Done, FrameRow, read_calibration, write_centrelines, write_frames
 from ..runs import imported
 from .door import read_shape
+from .field_unit import check_field_unit
 from .judge import Reading, Shape
 from .shapes import KEPT
 from .steps import StepRow, by_specimen, inside, read_steps
@@ -121,7 +121,7 @@ def import_table(
         read_calibration(calibration_file)
     rows = read_steps(table)
     if magnet is not None:
-        _check_unit(table, rows, magnet.magnet())
+        check_field_unit(table, rows, magnet.magnet())
     groups = by_specimen(rows)
     jobs = []
     for wanted, group in groups.items():
@@ -196,27 +196,6 @@ def _side(specimen: Specimen, magnet: Magnet | None) -> float:
     """Return the side to which the field bends the rod: the sign of M sin(angle)."""
     angle = math.radians(magnet.axis_angle_deg if magnet else 90.0)
     return math.copysign(1.0, specimen.remanence_mT) * math.sin(angle)
-
-
-def _check_unit(table: Path, rows: Sequence[StepRow], magnet: Magnet) -> None:
-    """Refuse readings that are ten times, or a tenth, of what the magnet gives."""
-    ratios = [
-        abs(row.flux_mT)
-        / abs(1e3 * magnet.remanence_T * float(axis_share(row.gap_mm, magnet.sides_mm)))
-        for row in rows
-        if not math.isnan(row.flux_mT) and not math.isnan(row.gap_mm)
-    ]
-    ratio = float(np.median(ratios)) if ratios else 1.0
-    if 6.0 < ratio < 16.0:
-        raise ConfigError(
-            f"{table}: its readings are {ratio:.1f} times what the magnet gives at "
-            "these gaps: are they gauss? head the column flux (G)"
-        )
-    if ratio > 500.0 or ratio < 0.002:
-        raise ConfigError(
-            f"{table}: its readings are {ratio:.3g} times what the magnet gives at "
-            "these gaps: head the column with their unit, as flux (T) or flux (G)"
-        )
 
 
 def _shapes(

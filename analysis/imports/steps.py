@@ -5,22 +5,26 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.columns import split_unit
 from ...core.door import file_below
 from ...core.errors import ConfigError
 from ...core.files import write_text
 from ...core.table import Table, read_table
+from ...core.units import unit_factor
 from .readers import workbook_tables
 
 PHOTOGRAPH = ("photograph", "photo", "picture", "image")
 CENTRELINE = ("centreline", "centerline", "shape")
 SIMULATED = ("simulated", "simulation", "comsol")
 SPECIMEN = ("specimen", "rod")
+FLUX = ("b", "field", "flux_density", "magnetic_field")
+"""Heads that mean `flux` where none is called so and the unit is one of a field."""
 PICTURES = frozenset(
     (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".webp", ".heic", ".heif")
 )
@@ -79,6 +83,7 @@ def read_steps(path: Path) -> list[StepRow]:
             f"{path}: must have a column photograph or centreline that names a file "
             f"in each row; instead it has {heads}"
         )
+    table = _with_flux(table)
     columns = {name: _numbers(table, name) for name in
                ("gap_mm", "flux_mT", "flux_sd_mT")}  # fmt: skip
     others = _others(table)
@@ -116,6 +121,18 @@ def _files(table: Table, names: tuple[str, ...]) -> list[str]:
             f"{table.path}: {' and '.join(found)} mean the same; leave one"
         )
     return [text.strip() for text in table.texts(found[0] if found else "")]
+
+
+def _with_flux(table: Table) -> Table:
+    """Return the table with its readings headed flux, whatever they are called."""
+    if table.has("flux_mT"):
+        return table
+    names = list(table.names)
+    for i, head in enumerate(names):
+        quantity, unit = split_unit(head)
+        if quantity.casefold() in FLUX and unit_factor(unit, "mT") is not None:
+            names[i] = f"flux ({unit})"
+    return replace(table, names=tuple(names))
 
 
 def _numbers(table: Table, name: str) -> NDArray[np.float64]:

@@ -114,6 +114,18 @@ def test_flux_alone_and_gap_alone_are_enough(bench: Path) -> None:
     assert other.of("magnet")[0].ok
 
 
+@pytest.mark.parametrize("head", ["B (T)", "field [T]", "Magnetic field (T)"])
+def test_a_reading_of_another_name_is_a_reading(bench: Path, head: str) -> None:
+    """It was kept in the records, and the run had no reading."""
+    text = (bench / "steps.csv").read_text()
+    text = text.replace("flux_mT", head).replace(",38.0", ",.038")
+    (bench / "steps.csv").write_text(
+        text.replace(",50.0,c", ",.05,c").replace(",66.0", ",.066")
+    )
+    run = load_run(imported(bench, magnet_file=bench / "cube.toml"))
+    assert [step.flux_mT for step in run.steps] == pytest.approx([38.0, 50.0, 66.0])
+
+
 def test_rods_of_one_table_become_runs_of_their_own(bench: Path) -> None:
     (bench / "other.toml").write_text(toml(specimen_dict(gmc(2)) | {"name": "other"}))
     rows = (bench / "steps.csv").read_text().splitlines()
@@ -128,10 +140,16 @@ def test_rods_of_one_table_become_runs_of_their_own(bench: Path) -> None:
 REFUSED: dict[str, tuple[Callable[[str], str], str]] = {
     "gauss typed as mT": (
         lambda t: t.replace(",38.0", ",380").replace(",50.0,c", ",500,c")
-        .replace(",66.0", ",660"), "are they gauss"),
+        .replace(",66.0", ",660"), r"fit as flux \(G\)"),
     "tesla typed as mT": (
         lambda t: t.replace(",38.0", ",.038").replace(",50.0,c", ",.05,c")
-        .replace(",66.0", ",.066"), "with their unit"),
+        .replace(",66.0", ",.066"), r"fit as flux \(T\)"),
+    "centimetres typed as mm": (
+        lambda t: t.replace("70.0,", "7.0,").replace("60.0,", "6.0,")
+        .replace("50.0,6", "5.0,6"), r"fit as gap \(cm\)"),
+    "readings of another magnet": (
+        lambda t: t.replace(",38.0", ",205").replace(",50.0,c", ",270,c")
+        .replace(",66.0", ",350"), "look at the magnet"),
     "readings swapped": (
         lambda t: t.replace("70.0,38.0", "70.0,66.0").replace("50.0,66.0", "50.0,38"),
         "lines 4 and 3.*swapped"),
