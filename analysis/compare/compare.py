@@ -26,7 +26,7 @@ from ...core.specimen import Specimen
 from ...core.text import defused
 from ..runs.data import Frame, RunData, Step
 from . import metrics
-from .field import check_gaps, field_of, fit_run_magnet
+from .field import check_sources, field_of, fit_run_magnet
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -248,7 +248,7 @@ def compare_run(
     """
     specimen = specimen or run.specimen
     support = support or run.support
-    check_gaps(run, sources)
+    check_sources(run, sources)
     fit, magnet = (None, None) if sources is not None else fit_run_magnet(run)
     comparisons = [
         _compare(run, step, name, specimen, sources or magnet, support, model)

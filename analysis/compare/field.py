@@ -18,23 +18,51 @@ UNSTATED = 0.01
 """Relative sd of a remanence from one reading without an sd: what hand meters claim."""
 
 
-def check_gaps(run: RunData, sources: sim.Field | None) -> None:
-    """Refuse sources that stand still where a run's gap changed.
+FAR_OFF = 4.0
+"""Factor between sources and readings that no magnet or probe is off by."""
+
+FAINT_MT = 1.0
+"""Readings below this may be mostly the earth's field and the probe's zero."""
+
+
+def check_sources(run: RunData, sources: sim.Field | None) -> None:
+    """Refuse sources that cannot be what a run stood before.
 
     Raises
     ------
     InputError
-        If no source waits for a gap, and steps have different ones.
+        If none waits for a gap, and steps have different ones; or if their field at the
+        undeformed tip is many times what the run's meter read there, or less.
     """
-    if sources is None or sources.follows_gap:
+    if sources is None:
         return
     gaps = {step.gap_mm for step in run.steps if math.isfinite(step.gap_mm)}
-    if len(gaps) > 1:
+    if len(gaps) > 1 and not sources.follows_gap:
         raise InputError(
             f"every source stands at a place of its own, but the gap of {run.label} "
             f"goes from {min(gaps):g} to {max(gaps):g} mm; leave centre_mm and gap_mm "
             "out of the source that the stage moves"
         )
+    ratios = [
+        ratio for step in run.steps if (ratio := _over_reading(step, run, sources))
+    ]
+    ratio = float(np.median(ratios)) if ratios else 1.0
+    if not 1.0 / FAR_OFF < ratio < FAR_OFF:
+        raise InputError(
+            f"the sources give {ratio:.2g} times what the Tesla-meter of {run.label} "
+            "read at the tip: look at the units of both (a map in gauss is headed "
+            "Bx (G)), at remanences and at places"
+        )
+
+
+def _over_reading(step: Step, run: RunData, sources: sim.Field) -> float | None:
+    """Return the sources' field at the tip over the reading; None without one."""
+    if not usable_flux(step) or abs(step.flux_mT) < FAINT_MT:
+        return None
+    field = field_of(step, "magnet", sources, run.specimen.length_mm)
+    if isinstance(field, str):
+        return None
+    return flux_at_tip_mT(field, run.specimen.length_mm)[0] / abs(step.flux_mT)
 
 
 def fit_run_magnet(

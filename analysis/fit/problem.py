@@ -19,7 +19,7 @@ from ...core.centreline import Centreline
 from ...core.errors import InputError, SolverError, StoreError
 from ...core.specimen import Specimen
 from ..compare.compare import frame_problem
-from ..compare.field import check_gaps, usable_flux
+from ..compare.field import check_sources, usable_flux
 from ..runs.data import RunData, Step
 from .fields import field_in, is_read, remanence_T
 from .noise import FLOOR_MM, mode_matrix, spectrum, stated_mm
@@ -335,7 +335,7 @@ def _collect(
     rods = _firsts([run.specimen for run in runs])
     benches = _firsts([sources or run.magnet for run in runs])
     for index, run in enumerate(runs):
-        check_gaps(run, sources)
+        check_sources(run, sources)
         nobody = Owner(-1, -1, index, rods[index], benches[index])
         first = len(shots)
         frames: dict[str, int] = {}

@@ -103,10 +103,12 @@ def _check_sign(problem: Problem) -> None:
         if min(abs(seen_mm), abs(wanted_mm)) < least_mm or seen_mm * wanted_mm > 0.0:
             return
     remanence_mT = problem.specimen.remanence_mT
+    kinds = {source.kind for shot in problem.shots for source in shot.field.sources}
+    mirrored = ", or an axis of the map is mirrored" if "map" in kinds else ""
     raise SolverError(
         f"{problem.specimen.name!r} bends the other way in every photograph: the sign "
         f"of its remanence ({remanence_mT:g} mT in the specimen file, + from root to "
-        "tip) or of the magnet's is wrong"
+        f"tip) or of the magnet's is wrong{mirrored}"
     )
 
 

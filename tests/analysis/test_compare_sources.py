@@ -6,8 +6,10 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from analysis_factory import GAPS_MM, write_run
+from numpy.typing import NDArray
 from typer.testing import CliRunner
 
 from magbend import sim
@@ -16,8 +18,9 @@ from magbend.analysis.compare.compare import compare_run
 from magbend.analysis.compare.field import flux_at_tip_mT
 from magbend.analysis.report.budget import tip_budget
 from magbend.cli.main import app
-from magbend.core.errors import InputError
+from magbend.core.errors import InputError, SolverError
 
+Array = NDArray[np.float64]
 SEVERAL = sim.Field(
     sim.Cuboid(sides_mm=30.0, remanence_T=1.3),
     sim.Cuboid(sides_mm=12.0, remanence_T=-1.2, centre_mm=(60.0, 25.0, 0.0)),
@@ -71,6 +74,25 @@ def test_sources_that_stand_still_are_refused_where_the_gap_changed(
     """All steps were taken for steps in one field, without a word."""
     with pytest.raises(InputError, match="goes from 30 to 80 mm; leave centre_mm and"):
         task(load_run(write_run(tmp_path / "a", gaps_mm=(80.0, 30.0))))
+
+
+def test_a_map_in_gauss_and_one_mirrored_are_told_by_the_run(tmp_path: Path) -> None:
+    """Both are fields like any other: readings and photographs tell, not the map."""
+    run = load_run(write_run(tmp_path / "a", sources=PLACED, gaps_mm=GAPS_MM[:1]))
+    length_mm = run.specimen.length_mm
+
+    def true_mT(points: Array) -> Array:
+        return np.array([sim.flux_mT(PLACED, p, length_mm=length_mm) for p in points])
+
+    box = [[-2.0, -16.0, -2.0], [32.0, 16.0, 2.0]]
+    turn = np.array([1.0, -1.0, 1.0])
+    gauss = sim.sampled_map(lambda p: 10.0 * true_mT(p), box, points=5)
+    mirrored = sim.sampled_map(lambda p: turn * true_mT(turn * p), box, points=5)
+    for ask in (compare_run, fit_runs):
+        with pytest.raises(InputError, match=r"10 times .* Bx \(G\)"):
+            ask(run if ask is compare_run else [run], sources=sim.Field(gauss))
+    with pytest.raises(SolverError, match="an axis of the map is mirrored"):
+        fit_runs([run], sources=sim.Field(mirrored))
 
 
 def test_a_report_names_the_sources_it_was_given(tmp_path: Path) -> None:
