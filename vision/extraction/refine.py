@@ -29,10 +29,11 @@ Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 
 _PASSES = 5
-_NEAR_PX = 0.4
+_NEAR_PX, _NEAR_FORESEEN_PX = 0.4, 1.5
 """The first pass, or the first two, only seek the rod: on every other station, with a
-supple curve. Two where the first moved it by more; its ends can wait, in a film until
-it is found."""
+supple curve. Two where the first moved it by more, which in a film, where what it
+missed is known, leaves a twentieth of that; its ends can wait, there until it is found.
+"""
 _SURE_PX = 0.25
 """A start that is so sure need not be sought."""
 _STILL_PX, _NEAR_STILL_PX = (0.05, 0.5), (0.08, 1.0)
@@ -181,6 +182,7 @@ def refine(
     seeking = sd_px > _SURE_PX
     seen = _look(grey, state, sign, 0, seeking=seeking)
     first, end, in_film = 0.0, last, bool(np.isfinite(sd_px))
+    near_px = _NEAR_FORESEEN_PX if in_film else _NEAR_PX
     if not in_film:
         tip, lines, first = find_ends(grey, state, seen, root, sign, walls, fine=False)
         end = tip.s
@@ -209,7 +211,7 @@ def refine(
         )
         state.curve, state.half = fit.curve, 0.5 * width
         state.first, state.last = 0.0, float(fit.curve.s[-1])
-        sought, seeking = seeking, seeking and not turn and aside > _NEAR_PX
+        sought, seeking = seeking, seeking and not turn and aside > near_px
         if sought and (in_film or not turn):
             first, end = 0.0, state.last
             continue
