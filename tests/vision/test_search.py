@@ -20,7 +20,7 @@ from magbend.vision.edge.state import LostError
 from magbend.vision.find import choose
 from magbend.vision.find.candidate import Candidate
 from magbend.vision.find.choose import LEAST_LENGTH, likely_rods
-from magbend.vision.find.rivals import is_shade, standing_out
+from magbend.vision.find.rivals import are_halves, is_shade, standing_out
 from magbend.vision.find.sought import Sought
 from magbend.vision.find.things import Thing, without_strokes
 from magbend.vision.synthetic import (
@@ -347,3 +347,21 @@ def test_two_strokes_on_one_ground_do_not_hide_a_rod_in_a_clamp_on_another(monke
     assert found.rivalled
     with pytest.raises(LostError, match="two things"):
         next(rods)
+
+
+def test_dark_sides_of_a_wide_bright_rod_are_no_two_rods():
+    """They are as far apart all along and end together, as two bent rods do not."""
+    theta = np.linspace(0.0, 0.8, 60)[:, None]
+    outwards = np.hstack([np.sin(theta), -np.cos(theta)])
+
+    def arc(radius, shift=0.0):
+        points = radius * outwards + np.array([300.0, 700.0 + shift])
+        return Candidate(
+            points_px=points, width_px=10.0, length_px=0.8 * radius, root="clamp",
+            contacts=1, ratio=0.1,
+        )  # fmt: skip
+
+    assert are_halves(arc(500.0), arc(536.0))
+    assert not are_halves(arc(500.0), arc(500.0, shift=-36.0))
+    assert not are_halves(arc(500.0), replace(arc(536.0), ratio=0.4))
+    assert not are_halves(arc(500.0), arc(590.0))

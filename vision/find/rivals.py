@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..edge.state import LostError
 from .candidate import Candidate
+from .rod import LEAST_SLENDERNESS
 from .sought import Sought
 from .things import Thing
 
@@ -35,6 +36,10 @@ rod, in widths of the thinner."""
 _HALVES = 2.5
 """Distance between the axes of two halves of a rod that a streak of gloss parts, at
 most, in widths of the wider, as far as that is known yet."""
+
+_EVEN, _FLUSH, _RIM_LIGHT = 0.2, 1.15, 0.15
+"""How much the distance of two rims wanders along their rod, in itself; how far their
+ends are from each other, in it; and how much lighter one is, of the paper's light."""
 
 _RIM_PX = 5.0
 """Width of a half that may be too thin to be seen as dark as it is."""
@@ -130,7 +135,24 @@ def are_halves(one: Candidate, other: Candidate) -> bool:
         return False  # halves are equally dark, as far as they are resolved
     away = np.array([one.away(point) for point in other.points_px])
     close = _HALVES * max(one.width_px, other.width_px)
-    return bool(np.quantile(away, 0.9) < close)
+    return bool(np.quantile(away, 0.9) < close) or _are_rims(one, other, away)
+
+
+def _are_rims(one: Candidate, other: Candidate, away: Array) -> bool:
+    """Whether two things, so far apart, are both sides of one wide and bright rod.
+
+    They leave one clamp side by side, as far apart all along, and end together.
+    """
+    gap = float(np.median(away))
+    ends = np.hypot(*(one.points_px[[0, -1]] - other.points_px[[0, -1]]).T)
+    return bool(
+        one.root == other.root == "clamp"
+        and one.contacts == other.contacts == 1
+        and abs(one.ratio - other.ratio) < _RIM_LIGHT
+        and np.ptp(np.quantile(away, [0.1, 0.9])) < _EVEN * gap
+        and ends.max() < _FLUSH * gap
+        and one.length_px > LEAST_SLENDERNESS * (gap + one.width_px)
+    )
 
 
 def too_many(rods: list[Candidate], sought: Sought) -> LostError:
