@@ -29,6 +29,9 @@ Image = NDArray[np.float32]
 
 _LANES = np.linspace(-0.5, 0.5, 9)
 _BESIDE = np.linspace(0.5, 2.0, 13)
+APART_PX = 2.0
+"""The two lines at a clamp tell different things if they are farther apart."""
+
 FACE_SEEN, FRONT_SEEN = 0.6, 3.0
 """Widths of the rod over which the two lines are seen."""
 _SHADED = 0.03
@@ -67,10 +70,14 @@ class ClampLines:
         (A) Where the rod's dark ends on its own lanes.
     front : EndFace or None
         (B) The clamp's front against the paper beside the rod.
+    end : float or None
+        Arc length, px, at which both sides of the rod end (`sides_end`), to a fraction
+        of its width; None where no place tells.
     """
 
     face: EndFace | None
     front: EndFace | None
+    end: float | None = None
 
     @property
     def blur(self) -> float:
@@ -84,7 +91,27 @@ class ClampLines:
             None if line is None else line._replace(s=line.s - first)
             for line in (self.face, self.front)
         )
-        return ClampLines(face=face, front=front)
+        end = None if self.end is None else self.end - first
+        return ClampLines(face=face, front=front, end=end)
+
+    def is_dark_face(self, apart: float, face_px: float) -> bool:
+        """Whether what lies between the two lines is the clamp's face, dark as the rod.
+
+        Seen obliquely, it makes the rod seem to end at the face's top edge. It is none
+        where the rod's sides end nearer to that than to the front.
+
+        Parameters
+        ----------
+        apart : float
+            How far the front lies ahead of the line on the rod, px.
+        face_px : float
+            How much of such a face may be seen, px.
+        """
+        if self.face is None or self.front is None:
+            return False
+        is_seen = APART_PX < apart < APART_PX + face_px
+        middle = 0.5 * (self.face.s + self.front.s)
+        return is_seen and (self.end is None or self.end > middle)
 
 
 def between(first: float, second: float, lines: ClampLines) -> float:
@@ -156,35 +183,67 @@ def find_clamp(
     ClampLines
         Each None where it is not seen.
     """
-    near = clear_of(blur)
-    span = reach + near + max(8.0, SPAN * blur)
-    wide = max(blur, _LEAST_PX)
-    front = fit_step(
+    front = find_front(
+        grey, curve, expected=expected, width=width, blur=blur, contrast=contrast,
+        reach=reach, ahead=ahead, sign=sign, fine=fine,
+    )  # fmt: skip
+    face = find_face(
+        grey, curve, expected=expected, width=width, blur=blur, contrast=contrast,
+        reach=min(reach, on_rod), front=front, optics=optics, sign=sign, fine=fine,
+    )  # fmt: skip
+    return squared(face, front, fine=fine)
+
+
+def find_front(
+    grey: Image, curve: Curve, *, expected: float, width: float, blur: float,
+    contrast: float, reach: float, ahead: float = 0.0, sign: float = 1.0,
+    fine: bool = True,
+) -> EndFace | None:  # fmt: skip
+    """Find the clamp's front beside the rod; see `find_clamp`."""
+    near, wide = clear_of(blur), max(blur, _LEAST_PX)
+    return fit_step(
         _front(
-            grey, curve, expected + 0.5 * ahead, span + 0.5 * ahead,
+            grey, curve, expected + 0.5 * ahead, _span(reach, blur) + 0.5 * ahead,
             (_BESIDE if fine else _BESIDE[::2]) * width, near, contrast,
             reach + 0.5 * ahead, sign,
         ),
         blur=blur, inner=_CLAMP_SPAN * wide, outer=SPAN * wide, own=True, fine=fine,
     )  # fmt: skip
+
+
+def find_face(
+    grey: Image, curve: Curve, *, expected: float, width: float, blur: float,
+    contrast: float, reach: float, front: EndFace | None = None,
+    optics: Sequence[float] = (), sign: float = 1.0, fine: bool = True,
+) -> EndFace | None:  # fmt: skip
+    """Find where the rod ends on its own lanes, its `front` known; see `find_clamp`."""
     face = fit_step(
         _face(
-            grey, curve, expected, span, width, near, contrast, min(reach, on_rod), sign
+            grey, curve, expected, _span(reach, blur), width, clear_of(blur), contrast,
+            reach, sign,
         ),
         blur=blur, inner=SPAN * blur, outer=_CLAMP_SPAN * blur, fine=fine,
         told=_told_blur(front, optics) if fine else (0.0, math.inf),
     )  # fmt: skip
-    if face is not None:
-        sigma = _ALIKE * face.sigma
-        face = face._replace(s=-face.s, skew=-face.skew, sigma=sigma)
-    return _square(face, front) if fine else ClampLines(face=face, front=front)
+    if face is None:
+        return None
+    return face._replace(s=-face.s, skew=-face.skew, sigma=_ALIKE * face.sigma)
 
 
-def _square(face: EndFace | None, front: EndFace | None) -> ClampLines:
+def _span(reach: float, blur: float) -> float:
+    """Return how far to either side lanes are taken to find a line within reach, px."""
+    span: float = reach + clear_of(blur) + max(8.0, SPAN * blur)
+    return span
+
+
+def squared(face: EndFace | None, front: EndFace | None, *, fine: bool) -> ClampLines:
     """Return the lines without those that no clamp has which a rod leaves squarely.
 
-    Nor has one a line that no step fits, where the other shows what its step is.
+    Nor has one a line that no step fits, where the other shows what its step is. Those
+    that are not `fine` are not known so well.
     """
+    if not fine:
+        return ClampLines(face=face, front=front)
     if (
         face is not None
         and front is not None

@@ -89,6 +89,8 @@ def fit_clamp(
     place_sd = math.hypot(root.sd, white_px(refined), edge)
     seen = FRONT_SEEN * refined.typical_width
     shift, covariance, apart = joint(place_sd, rod_sd, bend, turn, turn_sd, seen)
+    if root.lines_differ and apart > APART:  # that front is not the clamp's
+        shift, covariance, _ = joint(place_sd, rod_sd, bend, 0.0, math.inf, seen)
     own_sd_deg = math.degrees(math.sqrt(covariance[1, 1]))
     angle_deg, sd_deg, flags = surer_direction(
         told, math.degrees(heading + shift[1]), own_sd_deg

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..curve.robust import median, quantile, quantiles
-from ..edge.ends import APART_PX
+from ..edge.clamp import APART_PX
 from ..edge.flank import WHITE
 from ..edge.levels import clear_of
 from ..edge.state import LostError
@@ -254,12 +254,15 @@ def _is_no_face(refined: Refined) -> bool:
 def _lines_differ(refined: Refined) -> bool:
     """Whether a clamp's two lines lie apart, as its face does that is no dark one.
 
-    On a dark board it is as light as a light rod, whose root may be ahead of both.
+    On a dark board it is as light as a light rod, whose root may be ahead of both, if
+    its sides are not seen to end at the one on it.
     """
     lines = refined.clamp
     if lines is None or lines.face is None or lines.front is None:
         return False
-    return abs(lines.front.s - lines.face.s) > APART_PX
+    apart = abs(lines.front.s - lines.face.s)
+    at_face = lines.end is not None and abs(lines.end - lines.face.s) < 0.5 * apart
+    return apart > APART_PX and not at_face
 
 
 def _is_white_in_mix(photo: Photo, result: Measurement, refined: Refined) -> bool:

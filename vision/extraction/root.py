@@ -18,9 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..camera.projection import LocalView
-from ..edge.clamp import FACE_SEEN, FRONT_SEEN, doubt_px
+from ..edge.clamp import APART_PX, FACE_SEEN, FRONT_SEEN, doubt_px
 from ..edge.crossings import EndFace
-from ..edge.ends import APART_PX, is_face
 from .refine import Refined
 from .setting import UNKNOWN_CLAMP_MM, Setting
 
@@ -120,7 +119,8 @@ def root_place(
         return RootPlace(s=0.0, sd=BORDER_PX)
     apart = readings[-1].s - readings[0].s
     if abs(apart) > APART_PX:
-        if not is_face(apart, setting.face_px(refined.fit.curve)):
+        face_px = setting.face_px(refined.fit.curve)
+        if not refined.clamp.is_dark_face(apart, face_px):
             return RootPlace(s=readings[0].s, sd=0.5 * abs(apart), apart=apart)
         readings, apart = readings[1:], 0.0
     place, sd = together(readings, _lean_sd(setting, rise / along))
