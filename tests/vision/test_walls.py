@@ -9,7 +9,9 @@ import pytest
 
 from magbend.core.centreline import Centreline
 from magbend.vision import as_photo, extract, synthetic
+from magbend.vision.curve.curve import Curve
 from magbend.vision.edge import edges, wall_light
+from magbend.vision.edge.state import Seen, State
 from magbend.vision.edge.wall_light import short_of_end
 from magbend.vision.measurement import Pose
 from magbend.vision.synthetic import drawing
@@ -123,3 +125,24 @@ def test_edges_are_of_use_where_no_wall_is_seen_on_a_bent_rod():
     )  # fmt: skip
     assert not found.usable().all()
     assert found.usable(width - 27.0).all()
+
+
+@pytest.mark.parametrize("is_round", [True, False])
+def test_edges_of_one_width_are_used_by_whichever_section(is_round):
+    """Of a bent round rod no wall comes in sight, though one would of a square rod."""
+    s = np.linspace(0.0, 200.0, 201)
+    points, angle = np.column_stack([s, np.zeros(201)]), np.zeros(201)
+    state = State(Curve(s, points, angle, angle), np.full(201, 10.0), 20.0, 0.0, 200.0,
+                  0.0, False)  # fmt: skip
+    wall, one = np.maximum(3.0 - 0.05 * s, 0.0), np.ones(201)
+    wide = 20.0 * one if is_round else 20.0 + wall
+    sides = edges.Edges(
+        low=-10.0 * one, high=wide - 10.0, slope_low=0.3 * one, slope_high=0.3 * one,
+        inner=0.1 * one, outer_low=0.8 * one, outer_high=0.8 * one, shade_low=0.0 * s,
+        shade_high=0.0 * s, growth=0.0 * s,
+    )  # fmt: skip
+    seen = wall_light.to_wall_ends(
+        state, Seen(s, angle, sides, one > 0.0),
+        lambda at, *_: (np.interp(at[:, 0], s, wall), np.zeros(len(at))),
+    )  # fmt: skip
+    assert seen.good.all()

@@ -10,7 +10,7 @@ it says itself and as far as it lies from there.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -86,24 +86,32 @@ def nearest(
 
     Its front may be seen so far ahead of that. What no step fits is no end.
     """
-
-    def away(line: EndFace, ahead: float = 0.0) -> float:
-        return 0.0 if end is None else max(end - line.s, line.s - end - ahead, 0.0)
-
-    def least(ahead: float, *seen: EndFace | None) -> EndFace | None:
-        def off(line: EndFace) -> tuple[bool, float]:
-            unfitted = fine and line.rise <= 0.0
-            return unfitted, math.hypot(doubt_px(line), away(line, ahead))
-
-        return min((one for one in seen if one is not None), key=off, default=None)
-
-    face = least(0.0, lines.face, own.face)
-    front = least(ahead, lines.front, own.front)
+    face = _least((lines.face, own.face), end, 0.0, fine=fine)
+    front = _least((lines.front, own.front), end, ahead, fine=fine)
     if face is not None and front is not None and not front.bulge:
-        behind = front.s - face.s if end is None else away(face) - away(front, ahead)
+        behind = front.s - face.s
+        if end is not None:
+            behind = _away(face, end, 0.0) - _away(front, end, ahead)
         if behind > APART_PX:  # what ends behind a straight front may be of the clamp
             face = None
     return squared(face, front, fine=fine)
+
+
+def _least(
+    lines: Sequence[EndFace | None], end: float | None, ahead: float, *, fine: bool
+) -> EndFace | None:
+    """Return the line that is least in doubt and away from the end."""
+
+    def off(line: EndFace) -> tuple[bool, float]:
+        away = 0.0 if end is None else _away(line, end, ahead)
+        return fine and line.rise <= 0.0, math.hypot(doubt_px(line), away)
+
+    return min((one for one in lines if one is not None), key=off, default=None)
+
+
+def _away(line: EndFace, end: float, ahead: float) -> float:
+    """Return how far a line is from the end, or from as far ahead as it may be, px."""
+    return max(end - line.s, line.s - end - ahead, 0.0)
 
 
 def _in_rods_light(

@@ -47,7 +47,8 @@ _LEAST, _MOST = -0.3, 0.6
 def to_wall_ends(state: State, seen: Seen, walls: Walls) -> Seen:
     """Move edges from half level to where the side walls end, which are lighter.
 
-    And find out anew which are of use, now that the width less the walls is one.
+    And find out anew which are of use: the width less the walls is one now, or all of
+    the width of a round rod, whose section nobody told.
     """
     places = np.linspace(seen.s[0], seen.s[-1], WALL_PLACES)
     wall, gap = walls(*state.curve.at(places), state.width)
@@ -56,7 +57,9 @@ def to_wall_ends(state: State, seen: Seen, walls: Walls) -> Seen:
         MIRRORED, SKY,
     )  # fmt: skip
     moved = seen.edges._replace(low=low, high=high)
-    return replace(seen, edges=moved, good=moved.usable(wide))
+    flat, round_ = moved.usable(wide), moved.usable()
+    good = round_ if np.count_nonzero(round_) > np.count_nonzero(flat) else flat
+    return replace(seen, edges=moved, good=good)
 
 
 @njit(cache=True)
