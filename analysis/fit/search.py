@@ -128,7 +128,7 @@ def search(problem: Problem, limits: Limits, begin: Array | None = None) -> Arra
     if found is None:
         near = _levenberg(problem, limits, begin, ROUGH)
         found = _gauss_newton(problem, limits, near)
-    return _levenberg(problem, limits, begin, CLOSE) if found is None else found
+    return _levenberg(problem, limits, near, CLOSE) if found is None else found
 
 
 def _weak(prior: Array) -> Array:
