@@ -68,7 +68,7 @@ def parse_table(
     if not kept:
         raise ConfigError(f"{path}: must hold a table; it holds no row")
     separator = separator or _separator(kept, lines)
-    cells = list(_cells(lines, kept, separator, path))
+    cells = _without_title(list(_cells(lines, kept, separator, path)))
     names = _heads(cells[0][1], [lines[i] for i in said], separator)
     if names is cells[0][1]:
         del cells[0]
@@ -186,6 +186,23 @@ def _splits(comment: str, separator: str) -> Iterator[list[str]]:
     yield re.split(r"\s{2,}|\t", comment)
     yield _joined_units(comment).split()
     yield next(csv.reader([comment], skipinitialspace=True), [])
+
+
+def _without_title(cells: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
+    """Return the rows without a title above the heads: words, and fewer than those."""
+
+    def words(row: list[str]) -> list[str]:
+        return [cell for cell in row if cell.strip()]
+
+    while len(cells) > 2:
+        title, heads = words(cells[0][1]), words(cells[1][1])
+        below = len(words(cells[2][1]))
+        is_title = len(title) < len(heads) == below
+        numbers = [parse_number(cell) for cell in [*title, *heads]]
+        if not is_title or any(number is not None for number in numbers):
+            break
+        del cells[0]
+    return cells
 
 
 def _units_below(

@@ -126,9 +126,10 @@ def _chosen(path: Path, shapes: list[RawShape], wanted: str) -> RawShape:
         matching = [shape for shape in shapes if wanted in shape.source]
     if len(matching) == 1:
         return matching[0]
-    labels = "; ".join(
-        shape.label or shape.source.rpartition(", ")[2] for shape in shapes[:8]
-    )
+    names = [shape.label or shape.source.rpartition(", ")[2] for shape in shapes]
+    if len(set(names)) < len(names):
+        names = [str(number + 1) for number in range(len(names))]
+    labels = "; ".join(names[:8])
     which = f"@ {wanted} names {len(matching)} of" if wanted else "holds"
     raise InputError(
         f"{path}: {which} {len(shapes)} shapes; name one, as in "

@@ -8,8 +8,9 @@ makes a `Centreline` of it.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,8 +147,10 @@ def shapes_of(block: Block) -> list[RawShape]:
     sides = [values for head, values in block.columns if head == "side"]
     if sides and isinstance(sides[0], list):
         return [_between(block, heads, sides[0])]
-    cases = list(dict.fromkeys(head.case for head in heads if head.case))
     is_measured = any(head.quantity == "x" and head.unit != "px" for head in heads)
+    if not any(head.case for head in heads):
+        heads = _side_by_side(block, heads, is_measured=is_measured)
+    cases = list(dict.fromkeys(head.case for head in heads if head.case))
     shapes = []
     for case in cases or [""]:
         at = {
@@ -159,6 +162,35 @@ def shapes_of(block: Block) -> list[RawShape]:
         }
         shapes += _of_case(block, heads, at, case)
     return shapes
+
+
+def _side_by_side(
+    block: Block, heads: Sequence[_Head], *, is_measured: bool
+) -> list[_Head]:
+    """Give numbers to shapes that stand side by side, where nothing else tells them.
+
+    Raises
+    ------
+    ConfigError
+        If some are there more often than others.
+    """
+    seen: Counter[str] = Counter()
+    numbered = []
+    for head in heads:
+        if head.quantity in QUANTITIES and not (is_measured and head.unit == "px"):
+            seen[head.quantity] += 1
+            numbered.append(replace(head, case=f"{seen[head.quantity]}:"))
+        else:
+            numbered.append(head)
+    if max(seen.values(), default=1) == 1:
+        return list(heads)
+    if len(set(seen.values())) > 1:
+        counts = ", ".join(f"{name} {count} times" for name, count in seen.items())
+        raise ConfigError(
+            f"{block.source}: must have as many columns of each kind; instead it has "
+            f"{counts}; leave one of each, or name the shapes as x_mm @ step=1"
+        )
+    return numbered
 
 
 def _of_case(

@@ -385,3 +385,20 @@ def test_a_pipe_in_place_of_a_shape_is_refused_and_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "curve.csv")
     with pytest.raises(ConfigError, match="is a pipe or a device, not a file"):
         read_shapes(tmp_path / "curve.csv")
+
+
+def test_shapes_side_by_side_are_told_apart_and_none_is_taken_for_another(
+    tmp_path: Path,
+) -> None:
+    """As a digitiser saves its data sets; the last pair was taken without a word."""
+    weak = shape(20.0).points_mm
+    path = tmp_path / "sets.csv"
+    path.write_text("weak,,strong,\n" + text(columns(weak, XY), "X,Y,X,Y"))
+    for number, wanted in (("1", weak), ("2", XY)):
+        found = read_shape(f"sets.csv @ {number}", tmp_path, length_mm=LENGTH_MM)
+        assert found.line.tip_mm == pytest.approx(wanted[-1], abs=1e-3)
+    with pytest.raises(InputError, match=r"holds 2 shapes; name one.* @ 1"):
+        read_shape("sets.csv", tmp_path, length_mm=LENGTH_MM)
+    path.write_text(text(columns(weak, XY[:, 0]), "x_mm,y_mm,x_mm"))
+    with pytest.raises(ConfigError, match="x 2 times, y 1 times"):
+        read_shape("sets.csv", tmp_path, length_mm=LENGTH_MM)

@@ -28,6 +28,7 @@ READ = {
     "utf-16 big, without a mark": POINT.encode("utf-16-be"),
     "utf-32": POINT.encode("utf-32"),
     "semicolons and decimal commas": COMMA.encode(),
+    "a title above the heads": b"mass A,\n" + POINT.encode(),
     "sep line": b"sep=;\r\n" + COMMA.encode(),
     "quoted": b'"gap_mm","flux_mT"\n"70.5","38"\n"60.0","50.5"\n"50.25","66"\n',
     "quoted decimal commas": COMMA.replace("70,5", '"70,5"').encode(),
