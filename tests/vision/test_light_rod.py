@@ -83,5 +83,5 @@ def test_a_light_face_of_the_clamp_is_not_told_from_a_light_rod(monkeypatch):
 @pytest.mark.parametrize(("apart", "differ"), [(0.5, False), (12.0, True)])
 def test_two_lines_at_a_clamp_differ_by_more_than_pixels(apart, differ):
     face, front = (SimpleNamespace(s=s) for s in (-apart, 0.0))
-    rod = SimpleNamespace(clamp=SimpleNamespace(face=face, front=front, end=None))
+    rod = SimpleNamespace(clamp=SimpleNamespace(face=face, front=front))
     assert _lines_differ(rod) == differ

@@ -254,15 +254,12 @@ def _is_no_face(refined: Refined) -> bool:
 def _lines_differ(refined: Refined) -> bool:
     """Whether a clamp's two lines lie apart, as its face does that is no dark one.
 
-    On a dark board it is as light as a light rod, whose root may be ahead of both, if
-    its sides are not seen to end at the one on it.
+    On a dark board it is as light as a light rod, whose root may be ahead of both.
     """
     lines = refined.clamp
     if lines is None or lines.face is None or lines.front is None:
         return False
-    apart = abs(lines.front.s - lines.face.s)
-    at_face = lines.end is not None and abs(lines.end - lines.face.s) < 0.5 * apart
-    return apart > APART_PX and not at_face
+    return abs(lines.front.s - lines.face.s) > APART_PX
 
 
 def _is_white_in_mix(photo: Photo, result: Measurement, refined: Refined) -> bool:
