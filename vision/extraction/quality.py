@@ -24,7 +24,7 @@ from .crossing import over_paper
 from .deviations import scale_sd
 from .one_width import is_uneven
 from .refine import Refined
-from .root import HIDDEN_MM, root_hidden, smeared_px
+from .root import HIDDEN_MM, is_smeared, root_hidden
 from .setting import Setting
 from .strip import Strip
 
@@ -72,10 +72,10 @@ OFF_FRONT = 0.15
 """How far from the front that is seen beside it a rod may begin, in widths: two of
 three are nearer."""
 
-UNRESOLVED, SMEARED, TIP_SMEARED = 0.21, 0.075, 0.15
+UNRESOLVED, TIP_SMEARED = 0.21, 0.15
 """Blur, in widths, above which a clamp's front and its shade are seen as one line where
-shade pulls: an edge then takes half the rod's width to rise. Or by which that line is
-more blurred than the rod and its tip; or a tip's, more than the rod."""
+shade pulls: an edge then takes half the rod's width to rise. Or by which a tip is more
+blurred than the rod."""
 
 
 def refusal(
@@ -221,11 +221,12 @@ def _front_in_shade(refined: Refined, pull: float) -> bool:
     """Whether a clamp's front and its shade may be one line, or no step fits it."""
     if refined.clamp is None:
         return False
-    front, width = refined.clamp.front, refined.typical_width
+    front = refined.clamp.front
     if front is not None and front.rise == 0.0:
         return True
-    smeared = smeared_px(refined, refined.clamp.blur) > SMEARED * width
-    return smeared or (pull > SHADE_PX and refined.blur > UNRESOLVED * width)
+    unresolved = refined.blur > UNRESOLVED * refined.typical_width
+    smeared = is_smeared(refined, refined.clamp.blur)
+    return smeared or (pull > SHADE_PX and unresolved)
 
 
 def _is_off_front(refined: Refined, candidate: Candidate) -> bool:

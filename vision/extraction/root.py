@@ -26,13 +26,17 @@ from .setting import UNKNOWN_CLAMP_MM, Setting
 HIDDEN_MM = 0.05
 """What part of the root a clamp of unknown height may hide before that is named."""
 
-BORDER_PX, CARRIED, SMEARED = 0.3, 0.002, 0.25
+BORDER_PX, CARRIED, SMEARED, MIXED = 0.3, 0.002, 0.25, 0.8
 """Standard deviation of a place: px, of where a rod enters the picture; as shares of
 how far a line is carried to the height of the axis, and of what blurs a line more than
 the rod's sides and its tip: the front of a shade, seen as one step with the clamp's. A
 step of which the part q belongs to another line is blurred by sqrt(q (1 - q)) of the
 way to that, and moved by q of it: by sqrt(q / (1 - q)) of what it is blurred more. The
-likeliest is q = 0.06; much of such blur is noise of the blur that is fitted."""
+likeliest is q = 0.06; much of such blur is noise of the blur that is fitted. Where it
+is no noise, the part may be 0.4 (a shade 6 px before a clamp)."""
+
+CLEARLY_SMEARED = 0.075
+"""By how much a line is more blurred, in widths, that no noise explains."""
 
 UNCHECKED = 2.5
 """And over that of the rod's end on its own lanes where no front is seen beside it: the
@@ -200,7 +204,13 @@ def _line_sd(
     """
     unchecked = refined.clamp is None or refined.clamp.front is None
     own = (UNCHECKED if unchecked else 1.0) * doubt_px(line, seen)
-    return math.hypot(own, SMEARED * smeared_px(refined, line.blur), *doubts)
+    share = MIXED if is_smeared(refined, line.blur) else SMEARED
+    return math.hypot(own, share * smeared_px(refined, line.blur), *doubts)
+
+
+def is_smeared(refined: Refined, blur: float) -> bool:
+    """Whether a line at the clamp is clearly more blurred than the rod and its tip."""
+    return smeared_px(refined, blur) > CLEARLY_SMEARED * refined.typical_width
 
 
 def smeared_px(refined: Refined, blur: float) -> float:
