@@ -25,7 +25,7 @@ _DISCS = 3, 5, 7, 9, 13, 17
 _SEEN, _TILES = 0.07, 8
 """Distance from the paper of a line that matters; and tiles along either side."""
 
-_FULL, _EVERYWHERE = 0.03, 0.5
+_FULL, _EVERYWHERE = 0.03, 0.44
 """Part of a tile that lines cover; and share of the tiles that have some."""
 
 _DARKEST, _MORE = 0.9, 0.03
@@ -33,7 +33,7 @@ _DARKEST, _MORE = 0.9, 0.03
 how much farther something else is."""
 
 _LEFT = 0.12
-"""Part of the lines that a disc may leave: then a larger one is needed."""
+"""Part of a tile's lines that a disc may leave: then a larger one is needed."""
 
 
 def without_lines(binary: Binary) -> Binary | None:
@@ -46,11 +46,12 @@ def without_lines(binary: Binary) -> Binary | None:
     """
     coarse = np.asarray((_CODES * binary.ratio.clip(0.0, 1.0)).astype(np.uint8))
     covered = _covered(coarse, _DISCS[-1])
-    if float(np.mean(covered > _FULL)) < _EVERYWHERE:
+    full = covered > _FULL
+    if float(np.mean(full)) < _EVERYWHERE:
         return None
-    most = float(np.median(covered))
     for disc in _DISCS:
-        if float(np.median(_covered(coarse, disc))) > (1.0 - _LEFT) * most:
+        taken = _covered(coarse, disc)[full] / covered[full]
+        if float(np.median(taken)) > 1.0 - _LEFT:
             break
     return replace(binary, ratio=_closed(binary.ratio, disc + 2))
 
