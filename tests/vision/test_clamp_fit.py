@@ -190,5 +190,6 @@ def test_a_front_that_is_not_square_is_named_and_not_believed():
     found, off = measured(photo)
     assert "clamp_lines_differ" in found.flags
     assert off < 3.0 * found.clamp_angle_sd_deg < 1.0
-    # The foot lies half a millimetre ahead of the face, at which both sides end.
-    assert (found.pose.x_mm, found.pose.y_mm) == pytest.approx((-12.0, -6.0), abs=0.02)
+    # The foot lies half a millimetre ahead of the face, and the rod is dim on it.
+    off_mm = np.hypot(found.pose.x_mm + 12.0, found.pose.y_mm + 6.0)
+    assert off_mm < 3.0 * found.clamp_sd_mm

@@ -65,7 +65,18 @@ KINDS = [
 @pytest.mark.parametrize("kind", KINDS)
 def test_sides_end_at_the_front_alone(kind, first):
     end = sides_end(light_of(picture(**kind)), axis(first), 0.0, WIDTH)
-    assert end == pytest.approx(-first, abs=0.2 * WIDTH)
+    assert end.s == pytest.approx(-first, abs=0.2 * WIDTH)
+    assert end.is_clear
+
+
+def test_a_rod_that_goes_on_as_a_shade_on_a_dark_face_is_not_clear_up_to_there():
+    grey = picture(clamp=0.19, top=0.5)
+    y, x = np.mgrid[:HEIGHT, :WIDE]
+    face = (x > ROOT - 12.0) & (x < ROOT)
+    grey[face & (np.abs(y - Y) < 0.5 * WIDTH)] = 0.1
+    end = sides_end(light_of(grey), axis(0.0), 0.0, WIDTH)
+    assert end.s == pytest.approx(-12.0, abs=0.2 * WIDTH)
+    assert not end.is_clear
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -71,7 +71,7 @@ class ClampLines:
     front : EndFace or None
         (B) The clamp's front against the paper beside the rod.
     end : float or None
-        Arc length, px, at which both sides of the rod end (`sides_end`), to a fraction
+        Arc length, px, up to which the rod is fully seen (`sides_end`), to a fraction
         of its width; None where no place tells.
     """
 

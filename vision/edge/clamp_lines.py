@@ -61,7 +61,8 @@ def clamp_lines(
     fine : bool
         Whether to fit lines; else they only tell where to look next.
     """
-    end = sides_end(_light_of(grey, state), state.curve, state.first, state.width)
+    sides = sides_end(_light_of(grey, state), state.curve, state.first, state.width)
+    end = None if sides is None else sides.s
     lines = _in_rods_light(grey, state, end, seen.edges.contrast, sign, fine=fine)
     if state.clamp_light is not None or not _is_sure(lines, fine=fine):
         near = state.first if state.from_front and not fine else end
@@ -69,7 +70,7 @@ def clamp_lines(
         lines = nearest(lines, own, near, state.foot_px, fine=fine)
     if lines.face is not None and lines.front is None and state.plain is not None:
         lines = _with_plain_front(lines.face, state.plain, state, seen, fine=fine)
-    return replace(lines, end=end)
+    return replace(lines, end=end if sides is not None and sides.is_clear else None)
 
 
 def _is_sure(lines: ClampLines, *, fine: bool) -> bool:

@@ -11,6 +11,7 @@ on the clamp, is another thing.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,9 +44,25 @@ _ENOUGH, _SURE = 0.5, 0.35
 a part of that, it must be seen in the width before its end than in the one behind."""
 
 
+class SidesEnd(NamedTuple):
+    """Where both sides of a rod end.
+
+    Parameters
+    ----------
+    s : float
+        Arc length, px, to a fraction of a width.
+    is_clear : bool
+        Whether the rod is fully seen up to there. On paper it is, in any shade; before
+        a dark face of the clamp, on which it and its own shade lie, it is not.
+    """
+
+    s: float
+    is_clear: bool
+
+
 def sides_end(
     light_at: Callable[[Array], Array], curve: Curve, expected: float, width: float
-) -> float | None:
+) -> SidesEnd | None:
     """Return where along its axis both sides of a rod end.
 
     Parameters
@@ -62,8 +79,8 @@ def sides_end(
 
     Returns
     -------
-    float or None
-        Arc length, px, to a fraction of a width; None where no place tells.
+    SidesEnd or None
+        None where no place tells.
     """
     step = max(width / _STEP, 1.0)
     length = float(curve.s[-1]) - expected
@@ -86,7 +103,9 @@ def sides_end(
     best = int(sure[-1])
     while best > 0 and better[best - 1] >= better[best]:
         best -= 1
-    return _half_way(s, contrast, n + best, max(n // 2, 2))
+    place, near = n + best, max(n // 2, 2)
+    is_clear = median(contrast[place : place + near]) > _ENOUGH * usual
+    return SidesEnd(_half_way(s, contrast, place, near), is_clear)
 
 
 def _half_way(s: Array, contrast: Array, place: int, near: int) -> float:
