@@ -14,6 +14,7 @@ let view = null;
 let shownRun = "";
 let detailKey = "";
 let foreseeTimer = 0;
+let foreseen = 0;
 
 export function make(root) {
   const live = picture();
@@ -50,7 +51,9 @@ function planCard() {
   const rows = h("tbody");
   const start = h("button", {type: "button", class: "primary", onclick: startRun}, "Start the run");
   const save = h("button", {type: "button", onclick: savePlan}, "Save the plan");
-  const form = h("form", {class: "form", oninput: later, onsubmit: (event) => event.preventDefault()},
+  const touched = new Set();
+  const change = (event) => { touched.add(event.target); later(); };
+  const form = h("form", {class: "form", oninput: change, onsubmit: (event) => event.preventDefault()},
     field("Name", inputs.name), field("Operator", inputs.operator),
     field("Gaps, mm, from far to near", inputs.gaps_mm, "with commas between them; or from:to:step, such as 90:50:-5"),
     h("div", {class: "row"}, field("Settle at least, s", inputs.settle_s), field("Pictures a step", inputs.frames), field("Field readings", inputs.samples)),
@@ -59,16 +62,18 @@ function planCard() {
     h("h2", {}, "Plan"), form, problem, h("h3", {}, "What it should show"), plot,
     h("div", {class: "wide"}, h("table", {}, h("thead", {}, h("tr", {}, ["Step", "Gap, mm", "Flux, mT", "Time, s", "State"].map((name) => h("th", {scope: "col"}, name)))), rows)), total,
     h("div", {class: "row"}, start, save));
-  return {element, inputs, readings, byHand, problem, total, plot, rows, start, save};
+  return {element, inputs, touched, readings, byHand, problem, total, plot, rows, start, save};
 }
 
 async function load() {
+  const {inputs, touched, problem} = view.plan;
   try {
     const {values} = await query("plan");
-    for (const [name, input] of Object.entries(view.plan.inputs)) input.value = name === "gaps_mm" ? values.gaps_mm.join(", ") : values[name];
+    // What somebody has typed meanwhile stays.
+    for (const [name, input] of Object.entries(inputs)) if (!touched.has(input)) input.value = name === "gaps_mm" ? values.gaps_mm.join(", ") : values[name];
     foresee();
   } catch (error) {
-    say(view.plan.problem, error.message);
+    say(problem, error.message);
   }
 }
 
@@ -97,14 +102,17 @@ function later() {
 
 async function foresee() {
   const {plan} = view;
+  const mine = ++foreseen;
   try {
     const found = await query("plan", {values: JSON.stringify(values())});
+    if (mine !== foreseen) return;
     say(plan.problem, "");
     plan.start.disabled = false;
     fill(plan.rows, found.steps.map((step) => h("tr", {}, h("th", {scope: "row"}, String(step.index + 1)), ...[num(step.gap_mm, 2), num(step.flux_mT, 2), num(step.time_s, 0), step.status].map((text) => h("td", {}, text)))));
     drawShapes(plan.plot, found.steps.filter((step) => step.shape_mm).map((step) => ({points: step.shape_mm, label: num(step.gap_mm, 0)})));
     say(plan.total, `About ${clock(found.total_s)} with homing. Every gap is inside the limits; nothing has moved.`);
   } catch (error) {
+    if (mine !== foreseen) return;
     say(plan.problem, error.message);
     plan.start.disabled = true;
   }

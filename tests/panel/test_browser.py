@@ -156,6 +156,27 @@ def test_escape_stops_the_stage_from_a_page_that_only_watches(
     watcher.context.close()
 
 
+def test_what_is_typed_before_the_plan_has_come_is_not_written_over(
+    browser: Any, panel: Served
+) -> None:
+    page, watch = open_page(browser, f"{panel.url}#run")
+    plan, held = re.compile(r"/api/plan\?$"), []
+    page.route(plan, lambda route: held.append(route))
+    with page.expect_request(plan):
+        page.reload()
+    typed = page.get_by_label("Gaps, mm")
+    typed.fill("70:60:-10")
+    for route in held:
+        route.continue_()
+    expect(page.get_by_label("Name")).not_to_have_value("")
+    expect(typed).to_have_value("70:60:-10")
+    expect(page.get_by_text("nothing has moved")).to_be_visible()
+    table = page.get_by_role("region", name="Plan", exact=True).get_by_role("rowheader")
+    expect(table).to_have_count(2)
+    assert watch.errors == []
+    page.context.close()
+
+
 def test_a_run_goes_on_when_its_browser_is_killed(
     launch: Callable[[], Any], browser: Any, panel: Served
 ) -> None:
