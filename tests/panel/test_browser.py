@@ -112,9 +112,10 @@ def test_theory_is_drawn_over_the_live_picture(browser: Any, panel: Served) -> N
     page.keyboard.press("Enter")
     expect(page.locator("#gap-now")).to_have_text(re.compile(r"^60\.00"))
     magnet = page.get_by_role("row", name=re.compile("magnet, nominal"))
-    expect(magnet).to_contain_text(re.compile(r"0\.\d{3}"))
-    misfit = float(magnet.get_by_role("cell").first.inner_text())
-    assert 0.0 < misfit < 0.5  # the hidden truth is not the nominal bench
+    # Below 0.5 mm once the rod is still: the hidden truth is not the nominal bench.
+    misfit = magnet.get_by_role("cell").first
+    expect(misfit).to_have_text(re.compile(r"^0\.[0-4]\d{2}$"))
+    assert float(misfit.inner_text()) > 0.0
     assert page.evaluate(
         """() => { const over = document.querySelectorAll('canvas')[1];
         const data = over.getContext('2d').getImageData(0, 0, over.width, over.height);
