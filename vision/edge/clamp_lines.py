@@ -22,6 +22,7 @@ from .clamp import (
     APART_PX,
     ClampLines,
     doubt_px,
+    find_clamp,
     find_face,
     find_front,
     squared,
@@ -138,27 +139,20 @@ def _in_rods_light(
     close = ahead + on_rod - reach
     known: dict[str, Any] = {
         "width": state.width, "blur": state.clamp_blur or state.blur, "sign": sign,
-        "expected": expected, "fine": fine,
+        "expected": expected, "reach": reach, "fine": fine,
     }  # fmt: skip
-
-    def front_in(light: float, ahead: float) -> EndFace | None:
-        return find_front(
-            grey, state.curve, contrast=light, reach=reach, ahead=ahead, **known
-        )
-
     lines = ClampLines(face=None, front=None)
     for light in (contrast, _SHADED * contrast):
-        front = front_in(light, close)
-        face = find_face(
-            grey, state.curve, contrast=light, reach=on_rod, front=front,
+        lines = find_clamp(
+            grey, state.curve, contrast=light, on_rod=on_rod, ahead=close,
             optics=state.optics, **known,
         )  # fmt: skip
-        lines = squared(face, front, fine=fine)
         if lines.face is not None or lines.front is not None:
             break
     if lines.face is not None and lines.front is None and close < ahead:
         # One that is askew may need more room; what lies there else is its shade's.
-        return squared(lines.face, front_in(contrast, ahead), fine=fine)
+        front = find_front(grey, state.curve, contrast=contrast, ahead=ahead, **known)
+        return squared(lines.face, front, fine=fine)
     return lines
 
 
