@@ -173,8 +173,9 @@ def statistical(problem: Problem, linear: Linear) -> Array:
     """Return the covariance of the asked if the same bench were photographed again.
 
     Only what a photograph errs in is free: its line, its clamp's place and direction.
+    Lines err as their modes show; see `Linear.birge` for by what they err more.
     """
-    return linear.birge * _with(problem, linear, lambda name: scope_of(name) in _OWN)
+    return _with(problem, linear, lambda name: scope_of(name) in _OWN)
 
 
 def of_shapes(problem: Problem, linear: Linear) -> Array:

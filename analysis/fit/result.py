@@ -218,7 +218,7 @@ def result_of(
     names, directions = _degenerate(problem, vectors[:, bad])
     noise = statistical(problem, linear)
     # What lines err by beyond their own modes is in no row of the linear problem.
-    beyond = (1.0 - 1.0 / linear.birge) * noise
+    beyond = (linear.birge - 1.0) * noise
     covariance = (vectors * np.square(spread)) @ vectors.T + beyond
     root = np.sqrt(np.diag(covariance))
     is_modulus = np.array([name.startswith("E_MPa") for name in problem.names])
@@ -229,7 +229,7 @@ def result_of(
     found = [problem.value(k, float(unknowns[k])) for k in range(p)]
     value = np.where(known, found, np.nan)
     sd = value * np.sqrt(np.maximum(root**2 - shapes, 0.0) + _reach(shapes) ** 2)
-    again = value * _reach(np.diag(noise) * is_modulus)
+    again = value * _reach(np.diag(noise + beyond) * is_modulus)
     sections = len(problem.specimen.sections)
     return FitResult(
         E_MPa=tuple(value[:sections].tolist()),
