@@ -101,7 +101,8 @@ def calibrate(
         1.0, "--print-scale", help="Measured over nominal length of the print."
     ),
     rod_height_mm: float = typer.Option(
-        0.0, "--rod-height-mm", help="Height of the rod's axis above the board's plane."
+        None, "--rod-height-mm",
+        help="Height of the rod's axis above the board's plane.",
     ),
     camera_height_mm: float = typer.Option(
         None, "--camera-height-mm", help="Lens to plane, if you measured it (2 %)."
@@ -254,7 +255,7 @@ def _without_board(
     known_length: str | None,
     scale_mm_per_px: float | None,
     camera_height_mm: float | None,
-    rod_height_mm: float,
+    rod_height_mm: float | None,
 ) -> Calibration:
     from ..core.checks import positive
     from ..vision import calibrate_known_length, read_photo, scale_calibration

@@ -53,15 +53,15 @@ def setting_of(
     }
     if "length_mm" in given:
         positive(given["length_mm"], "--length-mm", "mm")
-    if known is not None:
-        height_mm = given.get("rod_height_mm", known.rod_height_mm)
-        _below_the_camera(height_mm, known.camera_height_mm)
-    return Setting(
+    setting = Setting(
         calibration=known,
         bare=None if bare is None else read_bare(bare, linear=others.get("linear")),
         **given,
         **others,
     )
+    if known is not None:
+        _below_the_camera(setting.axis_height_mm, known.camera_height_mm)
+    return setting
 
 
 def squareness(sd_deg: float | None) -> dict[str, float]:

@@ -62,7 +62,7 @@ def design_from(panel: Panel, arguments: Arguments) -> Outcome:
     command = [
         "analysis", "design", "--polyline", f"{DESIGNS}/{name}/curve.csv",
         "--calibration", panel.workspace.calibration_path.name,
-        "--rod-height-mm", f"{calibration.rod_height_mm:g}",
+        "--rod-height-mm", f"{calibration.rod_height_mm or 0.0:g}",
         "--magnet", f"{DESIGNS}/{name}/magnet.toml", "--gap-mm", f"{gap_mm:g}",
         "--figure", f"{DESIGNS}/{name}/design.svg", "--out", f"{DESIGNS}/{name}",
         "--count", str(COUNT), *_limits(arguments),

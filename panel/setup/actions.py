@@ -83,7 +83,7 @@ def calibrate(panel: Panel, arguments: Arguments) -> Outcome:
     if measured_mm is not None:
         scale = positive(number(arguments, "line_mm", "mm"), "line_mm", "mm") / LINE_MM
     calibration = panel.workspace.files().calibration
-    height_mm = calibration.rod_height_mm if calibration else 0.0
+    height_mm = calibration.rod_height_mm if calibration else None
     return board.calibrate(panel, rod_height_mm=height_mm, print_scale=scale)
 
 

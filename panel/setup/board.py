@@ -138,7 +138,7 @@ def forget(panel: Panel) -> None:
 
 
 def calibrate(
-    panel: Panel, *, rod_height_mm: float, print_scale: float
+    panel: Panel, *, rod_height_mm: float | None, print_scale: float
 ) -> dict[str, Any]:
     """Calibrate from the photographs of the board; write ``calibration.json``.
 

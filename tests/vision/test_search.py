@@ -205,6 +205,8 @@ def test_nobody_gave_the_height_of_the_rod():
     assert "height_assumed" in extract(photo, CAMERA).flags
     for known in (0.0, HEIGHT):
         assert "height_assumed" not in extract(photo, CAMERA, rod_height_mm=known).flags
+        told = replace(CAMERA, rod_height_mm=known)
+        assert "height_assumed" not in extract(photo, told).flags
 
 
 def test_the_root_is_under_the_edge_that_a_telephone_sees_over_it():

@@ -43,7 +43,7 @@ def calibrate(
     lens: Sequence[Photo] = (),
     *,
     board: Board,
-    rod_height_mm: float = 0.0,
+    rod_height_mm: float | None = None,
     camera_height_mm: float | None = None,
     focal_px: float | None = None,
 ) -> Calibration:
@@ -58,7 +58,7 @@ def calibrate(
         length and the distortion of the lens. Views that do not fit are dropped.
     board : Board
         What was printed.
-    rod_height_mm : float
+    rod_height_mm : float, optional
         Height of the rod's axis above the board's plane, kept for later.
     camera_height_mm, focal_px : float, optional
         What the user knows: distance from the lens to the plane (2 % is enough), or
@@ -83,7 +83,8 @@ def calibrate(
     same. The board is taken for square: if its print is stretched by 0.1 % in one
     direction, a single view misreads its height. See `bundle` for the fit.
     """
-    finite(rod_height_mm, "rod_height_mm", "mm")
+    if rod_height_mm is not None:
+        finite(rod_height_mm, "rod_height_mm", "mm")
     for value, name, unit in (
         (camera_height_mm, "camera_height_mm", "mm"), (focal_px, "focal_px", "px"),
     ):  # fmt: skip
@@ -160,7 +161,7 @@ def _source(views: int, camera_height_mm: float | None, focal_px: float | None) 
 
 def _calibration(
     bundle: Bundle, plane: Photo, board: Board, views: tuple[View, ...], source: str,
-    rod_height_mm: float,
+    rod_height_mm: float | None,
 ) -> Calibration:  # fmt: skip
     calibration = Calibration(
         image_size_px=plane.size_px,
@@ -219,7 +220,7 @@ def calibrate_known_length(
     length_mm: float,
     click_sd_px: float = 1.0,
     camera_height_mm: float | None = None,
-    rod_height_mm: float = 0.0,
+    rod_height_mm: float | None = None,
 ) -> Calibration:
     """Calibrate from one known length: the fallback where there is no board.
 
@@ -236,7 +237,7 @@ def calibrate_known_length(
     camera_height_mm : float, optional
         Height of the camera above the ruler's plane; without it height is not
         corrected.
-    rod_height_mm : float
+    rod_height_mm : float, optional
         Height of the rod's axis above that plane.
 
     Raises

@@ -72,8 +72,9 @@ class Calibration:
     tilt_sd_deg : float
         Standard deviation of the angle at which the plane is seen: what stands above it
         leans by so much to any side. 0 where a file of before does not tell.
-    rod_height_mm : float
-        Height of the rod's axis above the board's plane, taken when none is given.
+    rod_height_mm : float or None
+        Height of the rod's axis above the board's plane, taken when none is given; None
+        where nobody told it.
     print_scale : float
         Measured over nominal length of the printed board, as it was taken into account.
     board, views : str, tuple of View
@@ -95,7 +96,7 @@ class Calibration:
     scale_relative_sd: float
     rms_px: float
     tilt_sd_deg: float = 0.0
-    rod_height_mm: float = 0.0
+    rod_height_mm: float | None = None
     print_scale: float = 1.0
     board: str = ""
     views: tuple[View, ...] = ()
@@ -118,6 +119,8 @@ class Calibration:
                 "calibration rotation must be a rotation matrix; instead its product "
                 f"with its transpose differs from the unit matrix by {error:.2g}"
             )
+        if self.rod_height_mm is None:
+            return
         height = finite(self.rod_height_mm, "rod_height_mm", "mm")
         if height >= self.camera_height_mm:
             raise InputError(
@@ -221,7 +224,7 @@ def scale_calibration(
     image_size_px: tuple[int, int],
     camera_height_mm: float | None = None,
     scale_relative_sd: float = float("nan"),
-    rod_height_mm: float = 0.0,
+    rod_height_mm: float | None = None,
     tilt_sd_deg: float = STRAIGHT_SD_DEG,
     source: str = "a scale given by hand",
 ) -> Calibration:
@@ -237,7 +240,7 @@ def scale_calibration(
         Height of the camera above that plane; without it height is not corrected.
     scale_relative_sd : float
         Relative standard deviation of the scale.
-    rod_height_mm : float
+    rod_height_mm : float, optional
         Height of the rod's axis above that plane.
     tilt_sd_deg : float
         How squarely the camera looks down on it, as a standard deviation.

@@ -49,7 +49,7 @@ class TagModel(FileModel):
 class CalibrationModel(FileModel):
     """The file's keys; see `Calibration` for what they mean."""
 
-    schema_version: Literal[1] = Field(1, alias="schema")
+    schema_version: Literal[1, 2] = Field(1, alias="schema")
     image_size_px: tuple[int, int]
     focal_px: tuple[Positive, Positive]
     centre_px: Pair
@@ -63,7 +63,7 @@ class CalibrationModel(FileModel):
     scale_relative_sd: float | None
     rms_px: float | None
     tilt_sd_deg: float | None = None
-    rod_height_mm: float = 0.0
+    rod_height_mm: float | None = None
     print_scale: float = 1.0
     board: str = ""
     views: tuple[ViewModel, ...] = ()
@@ -74,7 +74,7 @@ class CalibrationModel(FileModel):
 def write_calibration(calibration: Calibration, path: Path) -> None:
     """Write `calibration` as JSON, whole or not at all."""
     data = {
-        "schema": 1,
+        "schema": 2,
         "image_size_px": list(calibration.image_size_px),
         "focal_px": list(calibration.focal_px),
         "centre_px": list(calibration.centre_px),
@@ -138,7 +138,7 @@ def _calibration(model: CalibrationModel) -> Calibration:
         scale_relative_sd=_or(model.scale_relative_sd, math.nan),
         rms_px=_or(model.rms_px, math.nan),
         tilt_sd_deg=_or(model.tilt_sd_deg, _untold_tilt_sd_deg(model)),
-        rod_height_mm=model.rod_height_mm,
+        rod_height_mm=_told_height_mm(model),
         print_scale=model.print_scale,
         board=model.board,
         views=tuple(
@@ -158,6 +158,13 @@ def _calibration(model: CalibrationModel) -> Calibration:
             else ClampTag(**model.clamp_tag.model_dump())
         ),
     )
+
+
+def _told_height_mm(model: CalibrationModel) -> float | None:
+    """Return the rod's height; files of before wrote 0 where nobody had told it."""
+    if model.schema_version == 1 and model.rod_height_mm == 0.0:
+        return None
+    return model.rod_height_mm
 
 
 def _untold_tilt_sd_deg(model: CalibrationModel) -> float:

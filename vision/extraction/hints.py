@@ -117,7 +117,7 @@ def with_ruler(photo: Photo, setting: Setting, hints: Hints) -> Setting:
     start, end, length_mm = hints.ruler
     scale = calibrate_known_length(
         photo.size_px, from_px=start, to_px=end, length_mm=length_mm,
-        rod_height_mm=setting.rod_height_mm or 0.0,
+        rod_height_mm=setting.rod_height_mm,
     )  # fmt: skip
     return replace(setting, calibration=scale)
 

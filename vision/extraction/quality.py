@@ -303,7 +303,7 @@ def _height_is_assumed(setting: Setting) -> bool:
     camera = setting.calibration
     if camera is None or setting.rod_height_mm is not None:
         return False
-    return camera.rod_height_mm == 0.0 and math.isfinite(camera.camera_height_sd_mm)
+    return camera.rod_height_mm is None and math.isfinite(camera.camera_height_sd_mm)
 
 
 def direction_is_doubtful(sd_deg: float, length_mm: float) -> bool:

@@ -92,7 +92,7 @@ class Setting:
         """Height of the rod's axis above the board's plane, as far as it is known."""
         if self.rod_height_mm is not None:
             return self.rod_height_mm
-        return 0.0 if self.calibration is None else self.calibration.rod_height_mm
+        return (self.calibration and self.calibration.rod_height_mm) or 0.0
 
     def fingerprint(self) -> str:
         """Return a digest that changes with everything that changes a result."""
