@@ -40,6 +40,12 @@ def calibration_facts(result: Calibration) -> dict[str, Any]:
     }
 
 
+def _known(value: float, sd: float) -> str:
+    """Return both to the second digit of the deviation, which is never told as 0."""
+    places = max(0, 1 - math.floor(math.log10(sd))) if 0.0 < sd < math.inf else 3
+    return f"{value:.{places}f} +- {sd:.{places}f}"
+
+
 def tell_calibration(result: Calibration, facts: dict[str, Any], out: Path) -> None:
     """Print a calibration for people."""
     for view in result.views:
@@ -49,9 +55,9 @@ def tell_calibration(result: Calibration, facts: dict[str, Any], out: Path) -> N
     if math.isfinite(result.camera_height_sd_mm):
         height, sd = result.camera_height_mm, result.camera_height_sd_mm
         say(
-            f"camera {height:.0f} +- {sd:.0f} mm above the plane "
+            f"camera {_known(height, sd)} mm above the plane "
             f"({result.camera_height_source}); per mm of height the scale shrinks by "
-            f"{100.0 / height:.3f} +- {100.0 * sd / height**2:.3f} %"
+            f"{_known(100.0 / height, 100.0 * sd / height**2)} %"
         )
         if sd > 0.3 * height:
             say(
@@ -66,6 +72,9 @@ def tell_calibration(result: Calibration, facts: dict[str, Any], out: Path) -> N
 _TOLD_ONCE = ("uncalibrated", "clamp_moved", "height_assumed")
 
 _EXPLAINED = {
+    "uncalibrated": "no calibration was given, so there are pixels and no mm: "
+    "photograph the board (magbend vision board), or a ruler, then magbend vision "
+    "calibrate, and give its file as --calibration",
     "height_assumed": "nobody said how high the rod's axis lies above the board; 0 mm "
     "is taken: give --rod-height-mm (half the rod's side, and what lies under it), 0 "
     "if the board lay at its height",
@@ -204,12 +213,11 @@ def tell_frames(result: BatchResult, *, json_output: bool) -> None:
 def tell_ringing(found: Ringing, settle_mm: float) -> None:
     """Print a vibration for people."""
     say(
-        f"frequency {found.frequency_Hz:.3f} +- {found.frequency_sd_Hz:.3f} Hz, "
-        f"damping ratio {found.damping_ratio:.4f} +- {found.damping_ratio_sd:.4f}"
+        f"frequency {_known(found.frequency_Hz, found.frequency_sd_Hz)} Hz, "
+        f"damping ratio {_known(found.damping_ratio, found.damping_ratio_sd)}"
     )
     settled = (
-        f"below {settle_mm:g} mm {found.settle_s:.2f} +- {found.settle_sd_s:.2f} s "
-        "later"
+        f"below {settle_mm:g} mm {_known(found.settle_s, found.settle_sd_s)} s later"
         if math.isfinite(found.settle_s)
         else "it does not die away"
     )
@@ -223,12 +231,14 @@ def tell_tag(placed: TagPlace, out: Path) -> None:
     """Print where the rod leaves the clamp, seen from its tag, for people."""
     for image, why in placed.left_out.items():
         say(f"{image}: left out: {why}", err=True)
-    tag = placed.tag
+    tag, count = placed.tag, len(placed.used)
+    upward = f"{abs(tag.root_x_mm):.3f} mm {'above' if tag.root_x_mm > 0 else 'below'}"
+    aside = f"{abs(tag.root_y_mm):.3f} mm {'left' if tag.root_y_mm > 0 else 'right'}"
     say(
-        f"tag {tag.number}: the rod leaves the clamp {tag.root_x_mm:.3f} mm above and "
-        f"{tag.root_y_mm:.3f} mm left of its middle, as printed, known to "
+        f"tag {tag.number}: the rod leaves the clamp {upward} and "
+        f"{aside} of its middle, as printed, known to "
         f"{tag.place_sd_mm:.3f} mm along the rod; its direction is "
-        f"{tag.angle_deg:.3f} +- {tag.angle_sd_deg:.3f} deg from the tag's upward "
-        f"({len(placed.used)} photographs)"
+        f"{_known(tag.angle_deg, tag.angle_sd_deg)} deg from the tag's upward "
+        f"({count} photograph{'s' if count > 1 else ''})"
     )
     say(f"{out}: written")

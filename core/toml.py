@@ -85,8 +85,8 @@ def read_toml(path: Path, model: type[Model], *, is_json: bool = False) -> Model
     try:
         data = parse_json(text.encode()) if is_json else _parse_toml(text)
     except (ValueError, RecursionError) as error:
-        kind = "JSON" if is_json else "TOML"
-        raise ConfigError(f"{path}: is not valid {kind}: {_short(error)}") from None
+        what = "" if is_json else "it is not valid TOML: "
+        raise ConfigError(f"{path}: {what}{_short(error)}") from None
     if is_list:
         raise ConfigError(f"{path}: must hold one JSON object, in braces, not a list")
     try:

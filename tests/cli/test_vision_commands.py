@@ -61,6 +61,7 @@ def test_calibrate_as_json(magbend, tmp_path):
     )  # fmt: skip
     facts = json.loads(out)
     assert code == 0
+    assert facts["rod_height_mm"] is None
     assert facts["camera_height_source"] == "given"
     assert facts["views"][0]["used"] is True
 
@@ -123,10 +124,11 @@ def test_one_refusal_among_good_ones_is_no_failure(magbend, tmp_path, calibratio
 
 @pytest.mark.parametrize("name", ["acrylic_20_1.jpg", "acrylic_25_1.jpg"])
 def test_yarn_is_measured_light_on_dark(magbend, tmp_path, name):
-    code, _, _ = magbend(
+    code, _, messages = magbend(
         "vision", "extract", FIXTURES / "yarn" / name, "--out", tmp_path
     )
     assert code == 0
+    assert "no calibration was given" in messages
     (row,) = read_frames(tmp_path / "frames.csv")
     assert "uncalibrated" in row.flags
     assert row.clamp_px[0] < 60.0  # the yarn leaves the left border ...

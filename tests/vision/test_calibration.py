@@ -205,12 +205,12 @@ def test_missing_calibration_is_refused(tmp_path):
 def test_text_in_place_of_a_calibration_is_no_json(tmp_path):
     path = tmp_path / "text.jpg"
     path.write_text("not a camera")
-    with pytest.raises(ConfigError, match="is not valid JSON"):
+    with pytest.raises(ConfigError, match=r"text\.jpg: it is not valid JSON"):
         read_calibration(path)
 
 
 def test_photograph_of_another_size_is_refused():
-    with pytest.raises(VisionError, match="1600 x 1200"):
+    with pytest.raises(VisionError, match=r"1600 x 1200 px; .* not turned or scaled"):
         scene_camera().check_size(1200, 1600)
 
 

@@ -54,7 +54,8 @@ def draw_overlay(
     Returns
     -------
     ndarray of uint8, shape (h, w, 3)
-        Blue, green, red. The axis is orange, the edges blue, clamp and tip green.
+        Blue, green, red. The axis is orange, the edges blue, clamp and tip green. What
+        was found stands in words below the photograph, of which it hides nothing.
     """
     width, height = photo.size_px
     longer = max(width, height)
@@ -73,8 +74,7 @@ def draw_overlay(
     else:
         _cross_out(picture)
         _draw_seen(picture, measurement, scale)
-    _caption(picture, measurement)
-    return picture
+    return np.vstack([picture, _caption(picture, measurement)])
 
 
 def overlay_png(photo: Photo, measurement: Measurement) -> bytes:
@@ -147,8 +147,8 @@ def _draw_seen(
         cv2.putText(picture, str(number), at, font, size, AXIS, 2, cv2.LINE_AA)
 
 
-def _caption(picture: NDArray[np.uint8], measurement: Measurement) -> None:
-    """Write length, tip and flags, or the reason of a refusal, in the corner."""
+def _caption(picture: NDArray[np.uint8], measurement: Measurement) -> NDArray[np.uint8]:
+    """Return a strip with length, tip and flags, or the reason of a refusal."""
     m = measurement
     if not m.ok:
         lines = [f"failed: {', '.join(m.flags)}", m.reason]
@@ -165,12 +165,13 @@ def _caption(picture: NDArray[np.uint8], measurement: Measurement) -> None:
     step = round(34 * size)
     room = max(10, int(picture.shape[1] / (19 * size)))
     lines = [part for line in lines for part in textwrap.wrap(line, room)]
-    band = picture[: step * len(lines) + step // 2]
-    band[:] = (band.astype(np.uint16) + 3 * 255) // 4
+    shape = (step * len(lines) + step // 2, picture.shape[1], 3)
+    strip = np.full(shape, 240, dtype=np.uint8)
     for row, line in enumerate(lines):
         text = line.encode("ascii", "replace").decode()
         at = (round(12 * size), step * (row + 1))
         cv2.putText(
-            picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, (40, 40, 40), 1,
+            strip, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, (40, 40, 40), 1,
             cv2.LINE_AA,
         )  # fmt: skip
+    return strip

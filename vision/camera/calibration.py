@@ -213,8 +213,8 @@ class Calibration:
             width, height = self.image_size_px
             raise VisionError(
                 f"the calibration is for photographs of {width} x {height} px; instead "
-                f"received {width_px} x {height_px} px: calibrate the camera that took "
-                "them, at the size it takes them"
+                f"received {width_px} x {height_px} px: take the file as its camera "
+                "wrote it, not turned or scaled by a program, or calibrate at its size"
             )
 
 
