@@ -215,6 +215,10 @@ def twin(
         save_board(played, state)
 
 
+_DOES = {"home": "homing", "goto": "moving", "jog": "jogging"}
+"""What is told of a command that moves the stage while it holds the bench."""
+
+
 @contextlib.contextmanager
 def connected(
     command: str, rig: Path, port: str | None, log: Path | None
@@ -236,7 +240,12 @@ def connected(
     clock = SystemClock()
     with contextlib.ExitStack() as opened:
         owner = opened.enter_context(
-            owning(rig, config.port, BenchState(), command=f"rig {command}")
+            owning(
+                rig,
+                config.port,
+                BenchState(state=_DOES.get(command, "idle")),
+                command=f"rig {command}",
+            )
         )
         wire = WireLog(log, clock) if log else None
         if wire:
@@ -282,6 +291,8 @@ def facts(stage: GapStage) -> dict[str, Any]:
 
 
 def _screen(data: dict[str, Any]) -> str:
+    from ..rig import STOP_INPUTS
+
     gap = data["gap_mm"]
     machine = data["stage_mm"]
     low, high = data["allowed_mm"]
@@ -294,7 +305,8 @@ def _screen(data: dict[str, Any]) -> str:
         "position": data["position_state"],
         "gap": f"{where}  (machine {counted})",
         "allowed": f"{low:g} to {high:g} mm",
-        "switches": data["pins"] or "none closed",
+        "switches": ", ".join(STOP_INPUTS.get(name, name) for name in data["pins"])
+        or "none closed",
     }
     if data["state"] == "alarm":
         rows["to do"] = "home it (magbend rig home), or magbend rig unlock"

@@ -229,6 +229,7 @@ from .stage.gap_records import (
 from .stage.gap_records import (
     MoveRecord as MoveRecord,
 )
+from .stage.grbl.protocol import STOP_INPUTS as STOP_INPUTS
 from .stage.grbl.stage import (
     GrblStage as GrblStage,
 )

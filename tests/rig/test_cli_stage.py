@@ -14,6 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 from magbend.cli.main import app
+from magbend.cli.rig_stage import connected
 from magbend.core.errors import ConfigError, MagbendError
 
 ISOLATED = Path(__file__).with_name("isolated.py")
@@ -46,6 +47,12 @@ def rig(*words: str) -> str:
         raise result.exception
     assert result.exit_code == 0, result.output
     return result.output
+
+
+@pytest.mark.parametrize(("command", "does"), [("goto", "moving"), ("home", "homing")])
+def test_who_asks_beside_a_moving_stage_is_told_that_it_moves(command, does):
+    with connected(command, Path("rig.toml"), None, None):
+        assert f"state      {does}" in rig("status")
 
 
 def test_a_session_from_power_up_to_a_gap(bench_folder):

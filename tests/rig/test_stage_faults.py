@@ -14,6 +14,7 @@ from magbend.rig.errors import (
     StoppedError,
 )
 from magbend.rig.interrupts import StopAtOnce
+from magbend.rig.stage.grbl.protocol import STOP_INPUTS
 from magbend.rig.stage.protocol import StageError
 from magbend.rig.virtual.board.plant import Plant
 
@@ -147,6 +148,32 @@ def test_a_switch_that_closes_under_way_stops_a_board_without_hard_limits():
     assert 120.0 < bench.true_gap_mm < 120.5 + 2 * 0.5 + 1.25
     with pytest.raises(PositionLostError):
         bench.stage.goto_gap(50.0)
+
+
+@pytest.mark.parametrize("letter", STOP_INPUTS)
+def test_an_input_that_asks_for_a_stop_stops_a_board_that_drives_on(letter):
+    """grblHAL (core of August 2026) reports a feed hold while it jogs, and jogs on."""
+    bench = homed_bench()
+    bench.later(2.0, lambda: setattr(bench.board.plant, "pressed", letter))
+    began_mm = bench.true_gap_mm
+    with pytest.raises(StoppedError, match=rf"{STOP_INPUTS[letter]} .*Pn:{letter}"):
+        bench.stage.goto_gap(60.0)
+    # 2 s and two reports at 5 mm/s, then the way that 10 mm/s2 takes to stop
+    assert began_mm - bench.true_gap_mm < 5.0 * 2.4 + 1.25
+    assert bench.stage.position_state == "homed"
+    stood = bench.board.plant.steps
+    bench.clock.sleep(1.0)
+    assert bench.board.plant.steps == stood
+    bench.stage.goto_gap(60.0)  # held closed from the start: wired the other way, or so
+    assert bench.true_gap_mm == pytest.approx(60.0, abs=0.005)
+
+
+def test_one_report_of_a_closed_input_is_noise():
+    bench = homed_bench()
+    bench.later(2.0, lambda: setattr(bench.board.plant, "pressed", "H"))
+    bench.later(2.05, lambda: setattr(bench.board.plant, "pressed", ""))
+    bench.stage.goto_gap(60.0)
+    assert bench.true_gap_mm == pytest.approx(60.0, abs=0.005)
 
 
 def test_homing_that_finds_no_switch_is_alarm_9():
@@ -352,7 +379,7 @@ def test_a_door_that_opens_on_the_way_is_named_and_the_stage_stands() -> None:
         )
 
     bench.later(1.0, open_the_door)
-    with pytest.raises(StageTimeoutError, match="state door") as failure:
+    with pytest.raises(StoppedError, match="safety door input") as failure:
         bench.stage.goto_gap(60.0)
     assert "it stood already" in str(failure.value)
     assert "cut the power" not in str(failure.value)

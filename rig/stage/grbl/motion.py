@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NoReturn
 
+from ....core.errors import StageError
 from ...clock import Clock
 from ...errors import StageTimeoutError
 from ..protocol import Moved
-from .protocol import Alarm, Ok, Refusal, Report
+from .protocol import STOP_INPUTS, Alarm, Ok, Refusal, Report
 from .session import CommandRefusedError, GrblSession
 
 POLL_S = 0.1
@@ -20,8 +22,12 @@ _STALL_S = 1.5
 _ASTRAY_MM = 0.2
 _SILENCE_S = 8.0
 _CLOSED = 2
-"""Reports in a row that call a switch closed: one may be noise."""
+"""Reports in a row that call an input closed: one may be noise."""
 _STANDING = ("idle", "alarm", "check", "sleep")
+
+
+class InputClosedError(StageError):
+    """Somebody asked for a stop at the board itself: a button, the safety door."""
 
 
 def stands(report: Report) -> bool:
@@ -37,7 +43,8 @@ def stands(report: Report) -> bool:
 class Target:
     """From where to where an axis moves, how exactly, and how long it may take.
 
-    `switch` is the letter of its limit switch, empty if that was closed at the start.
+    `switch` is the letter of its limit switch, `stops` those of the inputs that ask for
+    a stop; what was closed at the start is in neither.
     """
 
     axis: int
@@ -46,6 +53,11 @@ class Target:
     tolerance_mm: float
     limit_s: float
     switch: str = ""
+    stops: str = ""
+
+    def closed(self, pins: str) -> str:
+        """Return the letter that closed on the way, or nothing."""
+        return next((n for n in self.switch + self.stops if n in pins), "")
 
     def is_astray(self, here_mm: float) -> bool:
         """Return whether a place is not on the way: a digit of the line was lost."""
@@ -78,6 +90,9 @@ def await_arrival(
     ------
     AlarmError
         The board raised an alarm.
+    InputClosedError
+        Its feed hold, safety door, reset or emergency stop closed. grblHAL reports a
+        feed hold while it jogs, and drives on.
     PositionLostError
         It restarted.
     StageTimeoutError
@@ -98,15 +113,12 @@ def await_arrival(
         if report and machine and len(machine) > target.axis:
             heard_s, here = now_s, machine[target.axis]
             moved(here)
-            is_closed = target.switch != "" and target.switch in report.pins
-            closed = closed + 1 if is_closed else 0
+            letter = target.closed(report.pins)
+            closed = closed + 1 if letter else 0
             if closed == _CLOSED:
-                raise StageTimeoutError(
-                    f"the limit switch of {target.switch} closed at {here:.3f} mm, "
-                    "where the board counts free way: it has lost steps"
-                )
+                _raise_closed(letter, here)
             at_target = abs(here - target.machine_mm) <= target.tolerance_mm
-            if report.state == "idle" and at_target and not is_closed:
+            if report.state == "idle" and at_target and not letter:
                 return
             if last is None or abs(here - last) > target.tolerance_mm:
                 last, progress_s = here, now_s
@@ -122,6 +134,18 @@ def await_arrival(
         clock.sleep(POLL_S)
 
 
+def _raise_closed(letter: str, here_mm: float) -> NoReturn:
+    if letter in STOP_INPUTS:
+        raise InputClosedError(
+            f"the {STOP_INPUTS[letter]} of the board closed (Pn:{letter}) at "
+            f"{here_mm:.3f} mm"
+        )
+    raise StageTimeoutError(
+        f"the limit switch of {letter} closed at {here_mm:.3f} mm, where the board "
+        "counts free way: it has lost steps"
+    )
+
+
 def _raise_if_amiss(
     report: Report, here_mm: float, target: Target, still_s: float
 ) -> None:
@@ -135,7 +159,9 @@ def _raise_if_amiss(
             f"the stage stopped at {here_mm:.3f} mm instead of "
             f"{target.machine_mm:.3f} mm"
         )
-    if report.state in ("door", "sleep", "check"):
+    if report.state == "door":
+        _raise_closed("D", here_mm)
+    if report.state in ("sleep", "check"):
         raise StageTimeoutError(f"the board went to the state {report.state}")
 
 

@@ -20,6 +20,14 @@ JOG_CANCEL = b"\x85"
 
 Triple = tuple[float, ...]
 
+STOP_INPUTS = {
+    "H": "feed hold input",
+    "D": "safety door input",
+    "R": "reset input",
+    "E": "emergency stop input",
+}
+"""Letters of ``Pn:`` by which somebody at the board asks for a stop."""
+
 ERRORS: dict[int, str] = {
     1: "a letter was expected",
     2: "a number is badly formed",

@@ -28,8 +28,8 @@ from ..stopping import StopProof
 from . import audit as grbl_audit
 from .connect import FoundBoard, connect_board
 from .mark import set_mark
-from .motion import Target, await_arrival, await_homing, stands
-from .protocol import SOFT_RESET, Report, alarm_text, jog_line
+from .motion import InputClosedError, Target, await_arrival, await_homing, stands
+from .protocol import SOFT_RESET, STOP_INPUTS, Report, alarm_text, jog_line
 from .ready import (
     make_ready,
     note,
@@ -379,6 +379,8 @@ class GrblStage(SerialStage[GrblSession]):
         except LinkLostError:
             self._trust.doubt()
             raise
+        except InputClosedError as error:
+            raise StoppedError(f"{error}: {self.hold().sentence()}") from None
         except StageTimeoutError as error:
             self._give_up(session, error)
         self._trust.stands(session)
@@ -388,13 +390,15 @@ class GrblStage(SerialStage[GrblSession]):
         start = self._machine_mm()
         distance = 0.0 if start is None else target_mm - start
         letter, report = self._config.axis, self._require_session().report
+        pins = report.pins if report else ""
         return Target(
             axis=self._axis,
             start_mm=target_mm - distance,
             machine_mm=target_mm,
             tolerance_mm=self.limits.tolerance_mm,
             limit_s=self._limit_s(distance, feed_mm_min),
-            switch="" if report and letter in report.pins else letter,
+            switch="" if letter in pins else letter,
+            stops="".join(name for name in STOP_INPUTS if name not in pins),
         )
 
     def _give_up(self, session: GrblSession, error: StageTimeoutError) -> NoReturn:
@@ -410,7 +414,7 @@ class GrblStage(SerialStage[GrblSession]):
                 session.reset()
         raise StageTimeoutError(
             f"{error}; the stage was stopped ({how}) and its position is unverified: "
-            "home it"
+            f"{self._trust.way_out}"
         ) from None
 
     def _make_ready(self, session: GrblSession) -> None:

@@ -27,6 +27,8 @@ class Plant:
     ----------
     stuck, is_blind : bool
         All switches are closed; none ever closes.
+    pressed : str
+        Letters of the closed inputs that the board reports and passes over.
     """
 
     def __init__(
@@ -49,6 +51,7 @@ class Plant:
         self._watchers: list[Callable[[], None]] = []
         self.stuck = False
         self.is_blind = False
+        self.pressed = ""
 
     @property
     def steps(self) -> tuple[int, int, int]:

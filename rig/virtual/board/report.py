@@ -30,9 +30,9 @@ def status_report(board: BoardState) -> str:
     speed = board.mover.speed_mm_s * 60.0 if busy else 0.0
     parts.append(f"FS:{speed:.0f},0")
     switches = board.plant.switches()
-    if switches:
-        letters = "".join(n for bit, n in enumerate("XYZ") if switches >> bit & 1)
-        parts.append(f"Pn:{letters}")
+    letters = "".join(n for bit, n in enumerate("XYZ") if switches >> bit & 1)
+    if letters + board.plant.pressed:
+        parts.append(f"Pn:{letters}{board.plant.pressed}")
     return "<" + "|".join(parts + _extras(board, busy, offset)) + ">"
 
 
