@@ -143,9 +143,9 @@ def extract(
     made_with = [path for path in (calibration, bare) if path is not None]
     kept = f"{folder} holds what was measured; --resume goes on from there"
     with owning_folder(folder, "extraction", "vision extract", ours=is_made_by_us):
-        for path in (edges, figure_steps):
-            if path is not None:
-                output_file(path)
+        if figure_steps is not None:
+            read = [source.path for source in sources]
+            output_file(figure_steps, taken=[*read, *made_with])
         with progress("photographs", kept=kept) as report:
             result = extract_files(
                 images,

@@ -126,7 +126,7 @@ def calibrate(
     from ..vision import calibrate as calibrate_photos
     from ..vision import read_photo, write_calibration
 
-    output_file(out)
+    output_file(out, kind=".json", taken=[plane, *(lens or [])])
     if known_length or scale_mm_per_px is not None:
         if known_length and scale_mm_per_px is not None:
             raise typer.BadParameter("give --known-length or --scale-mm-per-px")
@@ -197,7 +197,7 @@ def clamp_tag(
     )
 
     target = out or calibration
-    output_file(target)
+    output_file(target, kind=calibration.suffix.lower(), taken=images)
     known: dict[str, float | None] = {
         "rod_height_mm": rod_height_mm, "clamp_height_mm": clamp_height_mm,
     }  # fmt: skip

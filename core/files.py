@@ -7,23 +7,43 @@ import errno
 import os
 import secrets
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from .errors import InputError
 
 
-def output_file(path: Path) -> Path:
+def output_file(path: Path, *, kind: str = "", taken: Iterable[Path] = ()) -> Path:
     """Return `path` once a file can be written there; call it before the work.
 
     Folders that are missing on the way are made.
 
+    Parameters
+    ----------
+    path : Path
+        The file.
+    kind : str
+        Suffix of what is written, such as ``.csv``: no file of another is replaced.
+    taken : iterable of Path
+        Files that are read, or written as something else: they are not replaced.
+
     Raises
     ------
     InputError
-        If `path` names a folder or nothing, or `output_folder` refuses its folder.
+        If `path` names a folder or nothing, a file that may not be replaced, or
+        `output_folder` refuses its folder.
     """
     _check_name(path)
+    if path.is_file():
+        if kind and path.suffix.lower() != kind:
+            raise InputError(
+                f"{path}: is there already, and is no {kind} file; give another name"
+            )
+        if any(other.exists() and path.samefile(other) for other in taken):
+            raise InputError(
+                f"{path}: is read, or written as something else, by the same command; "
+                "give another name"
+            )
     if not path.exists() or path.is_file():
         output_folder(path.parent)
     return path

@@ -147,6 +147,35 @@ def test_figure_and_edges_are_written(magbend, tmp_path, calibration):
 
 
 @pytest.mark.parametrize(
+    "words",
+    [
+        ["calibrate", "photo.png", "--scale-mm-per-px", "0.05", "--out", "photo.png"],
+        ["calibrate", "other.png", "--scale-mm-per-px", "0.05", "--out", "photo.png"],
+        ["extract", "photo.png", "--edges", "photo.png"],
+        ["extract", "photo.png", "--edges", "calibration.json"],
+        ["extract", "photo.png", "--edges", "measured/frames.csv"],
+        ["extract", "photo.png", "--figure-steps", "photo.png"],
+        ["extract", "photo.png", "--bare", "other.png", "--figure-steps", "other.png"],
+    ],
+)
+def test_no_output_takes_the_place_of_what_is_read_or_of_another_result(
+    magbend, tmp_path, monkeypatch, calibration, words
+):
+    monkeypatch.chdir(tmp_path)
+    assert magbend("vision", "extract", BOARD, "--no-overlays")[0] == 1
+    for name in ("photo.png", "other.png"):
+        cv2.imwrite(name, np.full((64, 64, 3), 200, np.uint8))
+    Path("calibration.json").write_bytes(calibration.read_bytes())
+    before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
+    frames = Path("measured/frames.csv").read_text()
+    code, _, messages = magbend("vision", *words)
+    assert code == 1
+    assert "give another name" in messages
+    assert all(path.read_bytes() == data for path, data in before.items())
+    assert Path("measured/frames.csv").read_text() == frames
+
+
+@pytest.mark.parametrize(
     ("words", "code", "sentence"),
     [
         (["board"], 2, "Missing option"),

@@ -174,6 +174,22 @@ def test_an_output_is_checked_before_the_work_and_its_folders_made(
     output_file(Path(os.devnull))
 
 
+def test_an_output_replaces_no_file_of_another_kind_and_none_that_is_read(
+    tmp_path: Path,
+) -> None:
+    photo, table = tmp_path / "plane.png", tmp_path / "shape.csv"
+    photo.write_text("a photograph")
+    output_file(table, kind=".csv", taken=[table])
+    table.write_text("a table")
+    assert output_file(table, kind=".csv", taken=[photo]) == table
+    with pytest.raises(InputError, match=r"is no \.csv file"):
+        output_file(photo, kind=".csv")
+    link = tmp_path / "link.csv"
+    link.symlink_to(table)
+    with pytest.raises(InputError, match="is read, or written as something else"):
+        output_file(link, taken=[table])
+
+
 def test_a_folder_that_cannot_be_written_is_refused_before_the_work(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

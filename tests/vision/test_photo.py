@@ -217,3 +217,12 @@ def test_colour_is_there_when_it_is_asked_for(tmp_path):
         np.testing.assert_array_equal(light[5, 15], (0.0, 1.0, 0.0))
         assert light[5, 25] == pytest.approx(0.2159, abs=1e-4)
     assert as_photo(pixels[..., 0]).colour() is None
+
+
+def test_a_tiff_of_floats_is_light_in_grey_and_of_no_other_scale():
+    light = as_photo(RAMP).grey
+    photo = decode_photo(encoded(light, ".tif"))
+    np.testing.assert_array_equal(photo.grey, light)
+    assert photo.colour() is None
+    with pytest.raises(VisionError, match="light from 0 to 1"):
+        decode_photo(encoded(RAMP.astype(np.float32), ".tif"))

@@ -109,13 +109,14 @@ def extract_files(
     with owning_folder(out, "extraction", "vision extract", ours=is_made_by_us):
         if overlays:
             output_folder(out / "overlays")
-        if edges is not None:
-            output_file(edges)
         task = _Task(setting, out / "overlays" if overlays else None, edges is not None)
         state = State(
             out, edges, setting.fingerprint(), [source.image for source in sources],
             _runs(sources, shared_clamp=shared_clamp),
         )  # fmt: skip
+        if edges is not None:
+            read = [source.path for source in sources]
+            output_file(edges, kind=".csv", taken=[*read, *state.tables])
         try:
             _measure_all(task, sources, state, workers, progress, resume=resume)
         finally:

@@ -74,10 +74,15 @@ class State:
         return ready
 
     @property
+    def tables(self) -> list[Path]:
+        """The tables that each batch has."""
+        return [self._out / name for name in _TABLES]
+
+    @property
     def files(self) -> list[Path]:
         """The files that `write` writes."""
         edges = [self._edges] if self._edges is not None else []
-        return [*(self._out / name for name in (*_TABLES, STATE_FILE)), *edges]
+        return [*self.tables, self._out / STATE_FILE, *edges]
 
     def load(self, sources: list[Source]) -> None:
         """Take over what an earlier call with the same settings has finished."""

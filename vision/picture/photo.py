@@ -172,7 +172,8 @@ def decode_photo(
     photo = replace(photo, orientation=header.orientation)
     if _keeps_colour(data) and not linear:
         return photo
-    if linear or pixels.ndim != 2:  # transparent pixels are white there
+    if linear or pixels.ndim != 2 or pixels.dtype.kind == "f":
+        # Transparent pixels are white there; decoders know no colours in float.
         return replace(photo, decode=None)
     flags = cv2.IMREAD_COLOR | cv2.IMREAD_ANYDEPTH
     return replace(photo, decode=cache(partial(_decode, data, source, flags)))
@@ -191,6 +192,12 @@ def _pixels(
     pixels = _decode(data, source, flags, page)
     if data[:8] == PNG and data[25] in (4, 6):
         pixels = _with_alpha(data, source, pixels)
+    if pixels.dtype.kind == "f" and np.median(pixels) > 1.0:
+        raise VisionError(
+            f"{source}: holds floating point values of {float(np.median(pixels)):.3g} "
+            "in the median; they must be light from 0 to 1 (white): save it with 8 or "
+            "16 bits"
+        )
     if pixels.dtype != np.uint16:
         return pixels
     if header.white_is_zero:
