@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -34,6 +36,21 @@ def test_a_rod_with_less_doubt_is_believed_unless_an_end_of_it_is_missed(
 ):
     both = line(400.0, SMOOTH), line(400.0 + longer_px, ROUGH)
     assert better(*both[:: -1 if swapped else 1]).flags == flags
+
+
+@pytest.mark.parametrize(
+    ("behind", "held_y", "held"),
+    [(20.0, 80.0, False), (45.0, 80.0, True), (20.0, 300.0, True)],
+    ids=["rod goes on behind", "bar behind", "another rod"],
+)
+def test_a_clamp_is_not_where_a_rod_from_the_border_leads_through(behind, held_y, held):
+    whole = line(600.0, ("clamp_at_border",))
+    x = whole.points["x_px"]
+    whole.points["width_px"] = np.where(x < 400.0, behind, 20.0)
+    part = replace(line(300.0, ROUGH), clamp_px=(400.0, held_y))
+    part.points["x_px"] += 300.0
+    part.points["y_px"][:] = held_y
+    assert (better(whole, part) is part) == held
 
 
 @pytest.mark.parametrize(

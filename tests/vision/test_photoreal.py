@@ -6,10 +6,18 @@ import json
 from functools import cache
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
-from magbend.vision import Board, Calibration, calibrate, extract, read_photo
+from magbend.vision import (
+    Board,
+    Calibration,
+    as_photo,
+    calibrate,
+    extract,
+    read_photo,
+)
 from magbend.vision.synthetic.scoring import signed_distance
 
 FOLDER = Path(__file__).parents[2] / "fixtures" / "vision" / "photoreal"
@@ -82,3 +90,11 @@ def test_glints_of_a_steel_clamp_on_grey_paper_do_not_hide_the_rod():
     line = np.array(truth["centreline_mm"])
     xy = np.column_stack([result.points["x_mm"], result.points["y_mm"]])
     assert np.sqrt(np.mean(signed_distance(xy, line) ** 2)) < 0.05
+
+
+def test_a_percent_of_light_does_not_turn_a_rod_into_what_comes_in_at_the_border():
+    pixels = cv2.imread(str(FOLDER / "camera_i" / "ph_I07.jpg"))
+    lighter = np.clip(np.rint(1.01 * pixels), 0, 255).astype(np.uint8)
+    one, other = (extract(as_photo(each), None) for each in (pixels, lighter))
+    assert other.length_px == pytest.approx(one.length_px, abs=0.5 * one.width_px)
+    assert "clamp_at_border" not in other.flags

@@ -5,15 +5,20 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import cv2
 import numpy as np
 import pytest
 from scipy.special import erf, ndtr
 
 from magbend.vision import Pose, as_photo, extract
+from magbend.vision.curve.curve import Curve
 from magbend.vision.edge.clamp import ClampLines, between
 from magbend.vision.edge.crossings import EndFace, crossings_of, line_through
+from magbend.vision.edge.ends import find_ends
+from magbend.vision.edge.state import State
 from magbend.vision.edge.step_line import _solve, fit_step
 from magbend.vision.edge.tip import _rough_end
+from magbend.vision.extraction.refine import _look
 from magbend.vision.extraction.root import SMEARED
 from magbend.vision.synthetic import (
     Block,
@@ -206,3 +211,16 @@ def test_a_step_of_which_nothing_is_known_is_none():
     step = np.zeros(3)
     assert not _solve(endless, np.ones(1), np.ones(1), BLUR, (BLUR, 1.0), step)
     assert not step.any()
+
+
+def test_both_ends_of_a_rod_that_floats_are_sought_as_far():
+    grey, short = np.full((120, 200), 0.8, np.float32), 7.0
+    grey[56:64, 40:161] = 0.1  # its ends are at 39.5 and 160.5
+    grey = cv2.GaussianBlur(grey, (0, 0), 0.8)
+    s = np.linspace(0.0, 121.0 - 2.0 * short, 108)
+    points = np.column_stack([39.5 + short + s, np.full(len(s), 59.5)])
+    axis = Curve(s, points, 0.0 * s, 0.0 * s)
+    state = State(axis, np.full(len(s), 4.0), 8.0, 0.0, s[-1], 0.0, rough=False)
+    seen = _look(grey, state, 1.0, 1, seeking=False)
+    tip, _, first = find_ends(grey, state, seen, "free", 1.0, None, fine=True)
+    assert (first, tip.s) == pytest.approx((-short, s[-1] + short), abs=0.02)

@@ -28,25 +28,8 @@ def find_ends(
 
     Those that are not `fine` only tell where to look next.
     """
-    curve, width = state.curve, state.width
-    outwards = 0.0 if fine else 0.4 * width
-    reach = 0.3 * width + 2.0 if fine else 1.3 * width
-    edges = seen.edges
-    near = seen.good & (seen.s > curve.s[-1] - 3.0 * width)
-    middle = median(edges.middle[near]) if near.any() and not fine else 0.0
-    end = seen.good & (seen.s > curve.s[-1] - 1.5 * width)
-    taper = median(edges.width[end]) if end.sum() > 3 else width
     face = None if walls is None else _face_seen(state, walls)
-    blur = state.tip_blur or state.blur
-    # The end of a taper may lie farther on, and be sharper than it seemed.
-    for far, soft in ((reach, blur), (1.3 * width, blur), (1.3 * width, state.blur)):
-        tip = find_tip(
-            grey, curve, expected=state.last + outwards, width=min(width, taper),
-            blur=soft, reach=far, contrast=seen.edges.contrast, middle=middle,
-            face=face, sign=sign, fine=fine,
-        )  # fmt: skip
-        if tip is not None:
-            break
+    tip = _free_end(grey, state, seen, sign, face, at_tip=True, fine=fine)
     if tip is None:
         raise LostError(
             "no_tip", "the free end of the rod shows no edge: lay plain paper there"
@@ -55,12 +38,42 @@ def find_ends(
     if walls is not None and fine:
         tip = _to_end_of_face(tip, state, seen, walls)
     if root == "border":
-        return tip, None, _border_crossing(grey, curve)
+        return tip, None, _border_crossing(grey, state.curve)
     if root == "free":
-        return tip, None, _other_end(grey, state, seen, sign, outwards, reach)
+        end = _free_end(grey, state, seen, sign, None, at_tip=False, fine=fine)
+        if end is None:
+            raise LostError("no_tip", "an end of the rod has no edge")
+        return tip, None, -end.s
     lines = clamp_lines(grey, state, seen, sign, fine=fine)
     state.clamp_blur = lines.blur
     return tip, lines, _first(lines, state.face_px)
+
+
+def _free_end(
+    grey: Image, state: State, seen: Seen, sign: float, face: float | None, *,
+    at_tip: bool, fine: bool,
+) -> EndFace | None:  # fmt: skip
+    """Return the tip, or the other end of a rod that floats, by `s` towards it."""
+    curve, edges, width, towards = state.curve, seen.edges, state.width, seen.s
+    expected, blur, aside = state.last, state.tip_blur or state.blur, 1.0
+    if not at_tip:
+        curve, towards, aside = curve.reversed(), -seen.s, -1.0
+        expected, blur = -state.first, state.blur
+    near = seen.good & (towards > curve.s[-1] - 3.0 * width)
+    middle = aside * median(edges.middle[near]) if near.any() and not fine else 0.0
+    end = seen.good & (towards > curve.s[-1] - 1.5 * width)
+    taper = median(edges.width[end]) if at_tip and end.sum() > 3 else width
+    outwards, reach = (0.0, 0.3 * width + 2.0) if fine else (0.4 * width, 1.3 * width)
+    # The end of a taper may lie farther on, and be sharper than it seemed.
+    for far, soft in ((reach, blur), (1.3 * width, blur), (2.0 * width, state.blur)):
+        found = find_tip(
+            grey, curve, expected=expected + outwards, width=min(width, taper),
+            blur=soft, reach=far, contrast=edges.contrast, middle=middle, face=face,
+            sign=sign, fine=fine,
+        )  # fmt: skip
+        if found is not None:
+            return found
+    return None
 
 
 def _face_seen(state: State, walls: Walls) -> float:
@@ -101,19 +114,6 @@ def _first(lines: ClampLines, face_px: float) -> float:
     if lines.is_dark_face(apart, face_px):
         return lines.front.s  # what has edges between them is no rod
     return line.s if abs(apart) > APART_PX else between(line.s, lines.front.s, lines)
-
-
-def _other_end(
-    grey: Image, state: State, seen: Seen, sign: float, outwards: float, reach: float
-) -> float:
-    back = state.curve.reversed()
-    end = find_tip(
-        grey, back, expected=outwards - state.first, width=state.width,
-        blur=state.blur, reach=reach, contrast=seen.edges.contrast, sign=sign,
-    )  # fmt: skip
-    if end is None:
-        raise LostError("no_tip", "an end of the rod has no edge")
-    return -end.s
 
 
 def _border_crossing(grey: Image, curve: Curve) -> float:

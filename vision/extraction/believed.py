@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..curve.curve import arc_lengths
 from ..curve.robust import median
 from ..find.candidate import Candidate
 from ..find.ground import LUMINANCE, View
@@ -21,6 +22,10 @@ something: all levels and colours are then looked at."""
 AS_LONG, AS_LONG_PX = 0.05, 1.0
 """By how much the lengths of a rod between the same ends may differ in two lights, in
 widths and px."""
+
+_NEAR, _FAR, _AS_WIDE = 0.5, 3.0, 1.3
+"""Stretches before and behind a place on a rod, in widths, and by what factor their
+widths differ where it ends, in a clamp say, between them."""
 
 _ELSEWHERE = 0.5
 """How far from where a rod's colour has it a side is none of that rod, in widths."""
@@ -51,11 +56,14 @@ def doubted(quick: Measurement) -> Measurement:
 def better(quick: Measurement, whole: Measurement) -> Measurement:
     """Return the one of two measurements that is longer, or held by a clamp.
 
-    Of two with the same ends it is that with fewer flags.
+    Of two with the same ends it is that with fewer flags. What ends where a rod that
+    comes in at the border leads through is a part of that.
     """
     if "clamp_at_border" in quick.flags:
-        held = not {"clamp_at_border", "no_clamp", "rough_edges"} & set(whole.flags)
-        return whole if held else quick
+        held = not {"clamp_at_border", "no_clamp"} & set(whole.flags)
+        ends = whole.clamp_px, whole.tip_px
+        part = any(_leads_through(quick, end) for end in ends)
+        return whole if held and not part else quick
     if not _same(quick, whole):
         return whole
     longer, shorter = sorted((quick, whole), key=lambda one: -one.length_px)
@@ -63,6 +71,21 @@ def better(quick: Measurement, whole: Measurement) -> Measurement:
     same_ends = apart < AS_LONG * longer.width_px + AS_LONG_PX
     fewer = len(shorter.flags) < len(longer.flags)
     return shorter if same_ends and fewer else longer
+
+
+def _leads_through(found: Measurement, place: tuple[float, float]) -> bool:
+    """Whether a rod is as wide before a place on it as behind: it ends not there."""
+    points, width = found.points, found.width_px
+    away = np.hypot(points["x_px"] - place[0], points["y_px"] - place[1])
+    if away.min() > width:
+        return False
+    s = arc_lengths(found.points_px) / width
+    beyond = s - s[away.argmin()]
+    before, behind = (
+        median(points["width_px"][(side > _NEAR) & (side < _FAR)])
+        for side in (-beyond, beyond)
+    )
+    return bool(1.0 / _AS_WIDE < before / behind < _AS_WIDE)
 
 
 def is_whole(found: Measurement, part: Measurement | None) -> bool:
