@@ -58,7 +58,7 @@ def drawn(
 def is_followed(found: Measurement) -> bool:
     """Whether a frame was not searched as if it were the first."""
     motion = found.motion
-    return motion is not None and bool(np.any(motion.state_px[1]))
+    return motion is not None and bool(np.any(motion.state[1]))
 
 
 def live(size: str, name: str, count: int, seed: int) -> None:

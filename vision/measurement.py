@@ -76,20 +76,26 @@ class Motion:
 
     Parameters
     ----------
-    state_px : ndarray, shape (3, n, 2)
-        Points of the axis, clamp to tip, their velocity and acceleration, px, px per
-        frame and per frame squared.
+    state : ndarray of complex, shape (3, n)
+        The root x + iy, px, and the logarithms of the n - 1 pieces of the axis, clamp
+        to tip; their velocity and acceleration, per frame and per frame squared.
     covariance : ndarray, shape (3, 3)
-        Of the three, of the point that moves most.
+        Of the three, of the point that moves most, in px.
     push_px : float
         Standard deviation of the change of an acceleration from frame to frame.
+    seen_px : ndarray, shape (k, n, 2)
+        The points as measured in the last frames, four at most.
+    beats_px2 : tuple of float
+        What these told of the frequency at which it swings.
     looked : Measurement
         Of the last frame in which joints were sought, and what lies around the rod.
     """
 
-    state_px: NDArray[np.float64]
+    state: NDArray[np.complex128]
     covariance: NDArray[np.float64]
     push_px: float
+    seen_px: NDArray[np.float64]
+    beats_px2: tuple[float, float]
     looked: Measurement
 
 

@@ -12,6 +12,7 @@ from magbend.vision.extraction import finish as finish_module
 from magbend.vision.extraction import follow as follow_module
 from magbend.vision.extraction import midline as midline_module
 from magbend.vision.extraction import refine as refine_module
+from magbend.vision.extraction.motion import pieces_of
 from magbend.vision.synthetic import Light, curve, draw, signed_distance
 
 SIZE, AT = (900, 640), (180.0, 520.0)
@@ -117,11 +118,11 @@ def test_where_a_rod_is_found_does_not_hang_on_where_it_was_expected(
     aside = along[:, ::-1] * [-1.0, 1.0] / np.linalg.norm(along, axis=1)[:, None]
     found = []
     for off_px in (-expected_off_px, expected_off_px):
-        state = first.motion.state_px.copy()
-        state[0] += off_px * s**2 * aside
+        state = first.motion.state.copy()
+        state[0] = pieces_of(first.points_px + off_px * s**2 * aside)
         doubt = max(0.5 * expected_off_px, 0.05)
         motion = replace(
-            first.motion, state_px=state, covariance=doubt**2 * np.eye(3), push_px=doubt
+            first.motion, state=state, covariance=doubt**2 * np.eye(3), push_px=doubt
         )
         last = replace(first, motion=motion)
         found.append(follow(photo, SETTING, last).points_px)

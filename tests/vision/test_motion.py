@@ -63,3 +63,14 @@ def test_a_jump_is_lost_and_a_new_film_begins():
 
 def test_a_failed_frame_has_no_motion():
     assert begun(Measurement(status="failed")).motion is None
+
+
+@pytest.mark.parametrize("turn", [0.0, np.pi])
+def test_a_rod_that_swings_is_expected_as_well_as_one_at_rest(turn):
+    """A tip that runs to and fro along an arc, by up to 22 px a frame."""
+
+    def swing(k):
+        return turn + 0.3 * np.cos(0.25 * k)
+
+    off, still = (followed(motion)[0][12:] for motion in (swing, lambda _: turn))
+    assert np.median(off) < 1.5 * np.median(still)
