@@ -115,12 +115,6 @@ def test_gap_is_bridged_and_widens_the_deviation():
     assert np.abs(off).max() < 0.05
 
 
-def leaning(size: int, reach: float) -> np.ndarray:
-    """Correlation of errors that neighbours 4 px apart share."""
-    apart = 4.0 * np.abs(np.subtract.outer(np.arange(size), np.arange(size)))
-    return np.exp(-apart / reach)
-
-
 def test_the_lever_tells_how_far_an_error_turns_the_root():
     s, points = arc(600.0, 1.2, step=4.0)
     weights = np.ones(len(s))
@@ -138,17 +132,3 @@ def test_the_lever_tells_how_far_an_error_turns_the_root():
     assert not plain.lever[40:55].any()
     # A shift of the whole rod turns nothing but the little that it moves a bend.
     assert abs(plain.lever.sum()) < 1e-2 * np.abs(plain.lever).sum()
-
-
-def test_shared_errors_turn_the_root_by_their_covariance():
-    s, points = arc(600.0, 0.9, step=4.0)
-    fit = fit_curve(s, points, np.ones(len(s)), spacing=30.0, stiffness=1e11)
-    drift = np.where(s < 100.0, 0.3, 0.05)
-    part = fit.lever * drift
-    for reach in (10.0, 60.0):
-        exact = part @ leaning(len(s), reach) @ part
-        assert fit.turned(drift, reach) == pytest.approx(exact**0.5, rel=1e-9)
-    white = np.linalg.norm(part)
-    assert fit.turned(drift, 1e-3) == pytest.approx(white, rel=1e-9)
-    # What neighbours share is not averaged out.
-    assert fit.turned(drift, 30.0) > 1.5 * white

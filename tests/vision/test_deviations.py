@@ -119,12 +119,13 @@ def test_a_limb_that_may_be_round_is_no_step(plain):
     assert untold.width_sd_mm > 1.4 * plain.width_sd_mm
 
 
-def test_a_shade_beside_the_clamp_leaves_its_direction_in_doubt(plain):
-    """Deep, on one side, for little more than a width: edges there tell another."""
-    beside = np.array([[-1.0, -0.3], [1.2, -0.3], [1.2, -4.0], [-1.0, -4.0]])
+def test_a_shade_beside_the_clamp_leaves_its_direction_in_doubt():
+    """Deep, on one side, for one width and a half, where all else is lit evenly."""
+    even = replace(SCENE, light=SceneLight(shadow_depth=0.0))
+    beside = np.array([[-1.0, -0.3], [1.5, -0.3], [1.5, -4.0], [-1.0, -4.0]])
     outline = SCENE.clamp.pose.to_board(beside)
     mark = Mark(outline_mm=outline, colour=(0.48, 0.48, 0.48))
-    shaded = measured(replace(SCENE, marks=(mark,)))
+    plain, shaded = measured(even), measured(replace(even, marks=(mark,)))
     assert shaded.clamp_angle_sd_deg > 1.3 * plain.clamp_angle_sd_deg
     off = abs(shaded.pose.angle_deg - SCENE.clamp.pose.angle_deg)
     assert off < 2.0 * shaded.clamp_angle_sd_deg

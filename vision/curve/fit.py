@@ -89,34 +89,6 @@ class CurveFit:
     def _deviation(self, first: NDArray[np.int64], rows: Array) -> Array:
         return np.asarray(_deviation(first, rows, self.covariance))
 
-    def turned(self, drift: Array, reach: float) -> float:
-        """Return by how much errors that neighbours share turn the root.
-
-        Parameters
-        ----------
-        drift : ndarray, shape (n,)
-            Standard deviation of such an error of each measured point, px.
-        reach : float
-            Distance over which their correlation falls by a factor e, px.
-
-        Returns
-        -------
-        float
-            Standard deviation of theta at the root, rad.
-        """
-        kept = math.exp(-float(self.curve.s[1] - self.curve.s[0]) / reach)
-        return math.sqrt(_shared_power(self.lever * drift, kept))
-
-
-@njit(cache=True)
-def _shared_power(part: Array, kept: float) -> float:
-    """Variance of the sum of parts whose correlation falls by `kept` a step."""
-    total, before = 0.0, 0.0
-    for x in part:
-        total += x * x + 2.0 * x * before
-        before = kept * (before + x)
-    return max(total, 0.0)
-
 
 @njit(cache=True)
 def _deviation(first: NDArray[np.int64], rows: Array, covariance: Array) -> Array:

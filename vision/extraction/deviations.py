@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from ..camera.calibration import Calibration
 from ..camera.projection import LocalView
-from ..curve.heading import sigma_heading, turned_without
-from ..curve.robust import median, quantile
+from ..curve.heading import sigma_heading
+from ..curve.robust import median
 from ..find.ground import View
 from ..measurement import Measurement
 from .refine import Refined
@@ -54,26 +54,20 @@ that is not dark, and what of it is left in a dark rod's width."""
 PALE_PX = 0.2
 """Of a width that is not dark, whatever is seen of its sides."""
 
-SUPPLE, SUPPLE_FREEDOM = 1.25, 5.0
-"""Of the direction at the clamp, over the fit's own, for a curve of so many free
-numbers, and with the root of more: they were chosen by the same points."""
-ODD, BACK, LATE, BENT = 1.75, 0.25, 0.5, 0.01
+SUPPLE = 1.3
+"""Of the direction at the clamp, over the fit's own: what is known of bending moments
+holds roughly."""
+ODD, BACK, LATE, BENT = 2.1, 0.25, 0.5, 0.01
 """Factor for a rod that is bent as no single force bends it: both ways, the lesser way
 by this share at least, or its root by less than this share of its most; by so much over
-its width. What is known of moments helps less at the root then."""
-BESIDE = 1.0
-"""Widths beside the clamp without which a rod has another direction: what its shade
-does to two edges alike, or to what is seen of one, no other number tells."""
-TURN_SHADE, TURN_WALL, TURN_PALE_WALL = 0.35, 0.065, 0.4
+its width. What is known of moments helps less at the root then. So it is beside paper
+that is white, where edges are fitted to a part of their light."""
+TURN_SHADE, TURN_WALL, TURN_PALE_WALL = 0.27, 0.11, 0.5
 """Shares of the shade's pull, and of the side wall that is seen (on a rod that is not
 dark: its light is not known), by which the midline is off all along, with one sign."""
-DRIFT_REACH, DRIFT_BENT, DRIFT_PALE_BENT = 1.5, 0.09, 0.2
-"""Errors that neighbours share over so many widths: px, by the angle that a rod turns
-over its width, for then the light on its sides changes;"""
-DRIFT_RELIT, DRIFT_WHITE, USUAL, NEAR = 1.0, 0.03, 0.9, 4.0
-"""of what an edge may move where the light on the rod changes beside its clamp, within
-so many widths, by more than on this part of the rest; of the blur where the paper is
-white."""
+TURN_UNEVEN, BESIDE = 0.3, 2.0
+"""Share by which it is off of what a rod is wider beside its clamp, within so many
+widths, than anywhere else: there a shade may have moved one edge (a half is all)."""
 
 WHOLE, CUT_OFF = 0.05, 0.45
 """Of an edge beside paper that is white, in px and again in blurs where all its light
@@ -247,24 +241,15 @@ def direction_rad(refined: Refined, root: float, wall: Array, seen_in: View) -> 
     seen_in : View
         The light it is seen in.
     """
-    fit, width = refined.fit, float(refined.width[0])
-    facing, bent = (
-        (TURN_WALL, DRIFT_BENT) if is_dark(seen_in)
-        else (TURN_PALE_WALL, DRIFT_PALE_BENT)
-    )  # fmt: skip
-    drift = np.hypot(
-        bent * fit.curve.kappa * width, DRIFT_RELIT * _lit_at_clamp(refined, width)
-    )
-    white = DRIFT_WHITE * refined.saturated * refined.blur
-    free = ODD if is_oddly_bent(fit.curve.kappa, width) else 1.0
-    supple = SUPPLE * math.sqrt(fit.freedom / SUPPLE_FREEDOM)
+    fit = refined.fit
     before = max(float(fit.curve.s[0]) - root, 0.0)
+    odd = refined.whole or is_oddly_bent(fit.curve.kappa, float(refined.width[0]))
+    facing = TURN_WALL if is_dark(seen_in) else TURN_PALE_WALL
     return math.hypot(
-        free * supple * sigma_heading(fit, before),
-        turned_without(fit, before, BESIDE * width),
-        free * fit.turned(np.hypot(drift, white), DRIFT_REACH * width),
+        SUPPLE * (ODD if odd else 1.0) * sigma_heading(fit, before),
         turned_by_shade(refined),
         facing * fit.lever @ wall,
+        TURN_UNEVEN * _turned_by_width(refined),
     )
 
 
@@ -288,9 +273,12 @@ def turned_by_shade(refined: Refined) -> float:
     return TURN_SHADE * abs(float(refined.fit.lever @ refined.shaded))
 
 
-def _lit_at_clamp(refined: Refined, width: float) -> Array:
-    """Return by how much more the light on a rod changes beside its clamp, px."""
-    s = refined.fit.curve.s
-    rest = refined.relit[s > s[0] + NEAR * width]
-    usual = quantile(rest, USUAL) if rest.size else 0.0
-    return np.maximum(refined.relit - usual, 0.0)
+def _turned_by_width(refined: Refined) -> float:
+    """Return how much more the width beside the root would turn it than any other, rad.
+
+    Were it all on one side: each part of the rod is laid to the root in turn.
+    """
+    fit, wider = refined.fit, refined.width - refined.typical_width
+    turned = np.abs(np.correlate(wider, fit.lever, "full")[wider.size - 1 :])
+    away = fit.curve.s - fit.curve.s[0] > BESIDE * refined.typical_width
+    return max(float(turned[0] - np.max(turned[away], initial=0.0)), 0.0)
