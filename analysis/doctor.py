@@ -27,6 +27,11 @@ REQUIRED = (
     "jinja2",
 )
 EXTRAS = {
+    "panel": ("starlette", "uvicorn", "websockets", "tomlkit"),
+    "heic": ("pillow-heif",),
+    "excel": ("openpyxl",),
+    "hdf5": ("h5py",),
+    "meters": ("pyvisa",),
     "library": ("pyarrow",),
     "cluster": ("dask", "distributed"),
     "train": ("jax", "optax"),

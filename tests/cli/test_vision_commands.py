@@ -102,7 +102,7 @@ def test_board_photograph_is_refused_as_a_bench_photograph(
         "vision", "extract", BOARD, "--calibration", calibration, "--out", tmp_path
     )
     assert code == 1
-    assert "none of the 1 photographs could be measured" in messages
+    assert "magbend: calib_D.jpg: " in messages
     (row,) = read_frames(tmp_path / "frames.csv")
     assert row.status == "failed"
     assert row.reason
@@ -241,7 +241,7 @@ def test_decoders_of_damaged_files_keep_quiet(calibration, tmp_path):
     )
     assert done.returncode == 1
     last = done.stderr.splitlines()[-1]
-    assert last.startswith("magbend: none of the 1 photographs could be measured")
+    assert last.startswith("magbend: cut.tif: ")
     assert "TIFF_" not in done.stderr
 
 

@@ -219,7 +219,7 @@ def test_scenes_that_cannot_be_told_are_refused(tmp_path, good, case):
     }[case]()  # fmt: skip
     save(tmp_path / "x.png", image)
     out = tmp_path / "out"
-    with pytest.raises(VisionError, match="none of the 1 photographs"):
+    with pytest.raises(VisionError, match=r"^x\.png: "):
         extract_files([tmp_path / "x.png"], out, setting=SETTINGS)
     (row,) = read_frames(out / "frames.csv")
     assert row.status == "failed"

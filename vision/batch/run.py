@@ -131,10 +131,11 @@ def extract_files(
             )  # fmt: skip
     frames = tuple(done.row for done in held)
     if not any(frame.ok for frame in frames):
-        first = frames[0]
+        first, count = frames[0], len(frames)
+        many = f"none of the {count} photographs could be measured; "
         raise VisionError(
-            f"none of the {len(frames)} photographs could be measured; "
-            f"{first.image}: {first.reason.removeprefix(f'{first.image}: ')}"
+            f"{many if count > 1 else ''}{first.image}: "
+            f"{first.reason.removeprefix(f'{first.image}: ')}"
         )
     return BatchResult(out=out, frames=frames)
 
