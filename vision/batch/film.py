@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +16,7 @@ from ..extraction.ring import Ringing, ring_down
 from ..extraction.setting import Setting
 from ..measurement import NAN2, Measurement
 from ..picture.photo import Photo, as_photo, refuse_special
+from ..picture.video import Video
 
 
 def read_film(path: Path) -> tuple[float, int, Iterator[Photo]]:
@@ -39,22 +39,11 @@ def read_film(path: Path) -> tuple[float, int, Iterator[Photo]]:
     if not path.exists():
         raise VisionError(f"{path}: there is no such file")
     refuse_special(path)
-    film = cv2.VideoCapture(str(path))
-    if not film.isOpened():
+    film = Video(path)
+    if not film.opened:
         raise VisionError(f"{path.name}: this video cannot be opened or has no frames")
-    fps, count = film.get(cv2.CAP_PROP_FPS), film.get(cv2.CAP_PROP_FRAME_COUNT)
-
-    def frames() -> Iterator[Photo]:
-        try:
-            while True:
-                found, pixels = film.read()
-                if not found:
-                    return
-                yield as_photo(np.asarray(pixels), source=path.name)
-        finally:
-            film.release()
-
-    return float(fps) if fps and np.isfinite(fps) else 0.0, int(count), frames()
+    photos = (as_photo(pixels, source=path.name) for pixels in film.frames())
+    return film.fps, film.count, photos
 
 
 def ring_of_film(

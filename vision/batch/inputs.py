@@ -8,14 +8,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any
-
-import cv2
-import numpy as np
 
 from ...core.errors import VisionError
 from ..picture.header import count_pages
 from ..picture.photo import Photo, as_photo, read_photo, refuse_special
+from ..picture.video import Video, count_frames
 
 PICTURES = frozenset(
     (
@@ -132,11 +129,7 @@ def _of_picture(path: Path, run: Path | None = None) -> list[Source]:
 
 
 def _of_video(path: Path) -> list[Source]:
-    video = cv2.VideoCapture(str(path))
-    try:
-        count = int(video.get(cv2.CAP_PROP_FRAME_COUNT)) if video.isOpened() else 0
-    finally:
-        video.release()
+    count = count_frames(path)
     if count <= 0:
         return [Source(image=path.name, path=path, frame=0)]  # fails in its row
     return [
@@ -217,27 +210,6 @@ def _file_digest(path: Path, _changed: int) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-class _Video:
-    """An open video that reads on without seeking where it can."""
-
-    def __init__(self, path: Path) -> None:
-        self._video: Any = cv2.VideoCapture(str(path))
-        self._next = 0
-
-    @property
-    def opened(self) -> bool:
-        """Whether the decoder took the file."""
-        return bool(self._video.isOpened())
-
-    def read(self, frame: int) -> np.ndarray | None:
-        """Return one frame, blue green red; None where it cannot be decoded."""
-        if frame != self._next:
-            self._video.set(cv2.CAP_PROP_POS_FRAMES, frame)
-        found, pixels = self._video.read()
-        self._next = frame + 1
-        return np.asarray(pixels) if found else None
-
-
 @cache
-def _video(path: Path) -> _Video:
-    return _Video(path)
+def _video(path: Path) -> Video:
+    return Video(path)

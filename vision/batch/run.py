@@ -36,7 +36,7 @@ from .tables import Done, FrameRow, done_with
 _log = logging.getLogger(__name__)
 
 _CHUNK = 8
-_EVERY = 10
+_EVERY = 30
 """Of a film every so many frames are drawn, and those that were refused: to draw and
 store one takes longer than to measure it."""
 
