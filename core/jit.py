@@ -9,6 +9,7 @@ else calls kernels and gets machine code.
 from __future__ import annotations
 
 import functools
+import gc
 import hashlib
 import itertools
 import os
@@ -76,14 +77,17 @@ class Kernel:
     def _compile(self) -> Any:
         from numba import njit as numba_njit
 
+        options = self._options
         try:
-            compiled = numba_njit(**self._options)(self._function)
+            compiled = numba_njit(**options)(self._function)
         except RuntimeError as error:
             if "no locator available" not in str(error):
                 raise
             # Neither beside the source nor in the home can anything be written.
-            return numba_njit(**{**self._options, "cache": False})(self._function)
-        if self._options.get("cache"):
+            options = {**options, "cache": False}
+            compiled = numba_njit(**options)(self._function)
+        compiled.get_call_template = _by_kind(compiled)
+        if options.get("cache"):
             file = compiled._cache._cache_file
             file._source_stamp = (file._source_stamp, self.fingerprint)
             compiled.compile = _one_at_a_time(compiled)
@@ -170,6 +174,22 @@ class Kernel:
             raise _Unfit from None
 
 
+def _by_kind(compiled: Any) -> Callable[[Any, Any], Any]:
+    """Return a dispatcher's `get_call_template` that takes a constant for a variable.
+
+    Numba would compile a kernel anew for each constant that another one hands it.
+    """
+    from numba.core.types.misc import unliteral
+
+    get_call_template = compiled.get_call_template
+
+    def get_by_kind(args: Any, options: Any) -> Any:
+        kinds = {name: unliteral(kind) for name, kind in options.items()}
+        return get_call_template(tuple(map(unliteral, args)), kinds)
+
+    return get_by_kind
+
+
 def _one_at_a_time(compiled: Any) -> Callable[[Any], Any]:
     """Return a dispatcher's `compile` that lets one process compile what others load.
 
@@ -181,13 +201,28 @@ def _one_at_a_time(compiled: Any) -> Callable[[Any], Any]:
     compile_, file = compiled.compile, compiled._cache._cache_file
 
     def compile_in_turn(signature: Any) -> Any:
-        with global_compiler_lock, ExitStack() as held:
+        with global_compiler_lock, _no_collection(), ExitStack() as held:
             if not compiled._compiling_counter:
                 held.enter_context(one_process(Path(f"{file._index_path}.lock")))
                 _remove_outdated(file)
             return compile_(signature)
 
     return compile_in_turn
+
+
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """Let Python look for no garbage: a compiler makes millions of objects that stay.
+
+    The looking takes a tenth of the time of compiling.
+    """
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 @contextmanager

@@ -42,6 +42,21 @@ def test_a_kernel_called_by_a_kernel_compiles_with_it() -> None:
     assert once(lambda: power_sum(2.0, 10)) == power_sum(2.0, 10)
 
 
+@njit()
+def part(x, share, halved):
+    return 0.5 * x if halved else share * x
+
+
+@njit()
+def parts(x, n):
+    return part(x, 3, False) + part(x, 4, False) + part(x, 0, True) + part(x, n, n > 2)
+
+
+def test_a_kernel_is_compiled_once_for_all_constants_handed_to_it() -> None:
+    assert parts(2.0, 3) == 6.0 + 8.0 + 1.0 + 1.0
+    assert len(part.compiled.signatures) == 1
+
+
 def test_once_runs_as_written_and_needs_no_numba() -> None:
     code = (
         "import sys; from magbend.core import jit; from magbend.core.jit import once\n"
