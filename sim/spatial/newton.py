@@ -96,6 +96,15 @@ def _move(R, r, x):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _put(R, r, Rb, rb):  # type: ignore[no-untyped-def]
+    """Put the tip's pose (R, r) to (Rb, rb)."""
+    for i in range(3):
+        r[i] = rb[i]
+        for j in range(3):
+            R[i, j] = Rb[i, j]
+
+
+@njit(cache=True)
 def room(rod, field, n):  # type: ignore[no-untyped-def]
     """Return what marches of up to n steps work in and leave.
 
@@ -138,8 +147,10 @@ def unloaded(rod, field, n, Rc, R, r, held):  # type: ignore[no-untyped-def]
     Without load a march from any pose gives the rod but for a rigid motion.
     """
     work, _, table, known = held
-    R[:] = Rc
-    r[:] = Rc[:, 2]
+    for i in range(3):
+        r[i] = Rc[i, 2]
+        for j in range(3):
+            R[i, j] = Rc[i, j]
     if np.any(rod[:, K1 : K3 + 1]):
         r[:] = 0.0
         run(rod, field, 0.0, n, R, r, False, math.inf, held)
@@ -240,8 +251,10 @@ def follow(rod, field, bends, n, Rc, R, r, goal, J, held):  # type: ignore[no-un
             return index, 1.0
         jump = min(jump, 1.0 - load)
         ahead = 1.0 if jump == 1.0 - load else load + jump
-        Rb[:], rb[:] = R, r
-        x[:] = jump * secant + bends * jump * (jump + last) * bend
+        _put(Rb, rb, R, r)
+        for i in range(6):
+            x[i, 0] = jump * secant[i, 0]
+            x[i, 0] += bends * jump * (jump + last) * bend[i, 0]
         there = -1
         if _move(R, r, x) < LONGEST:
             held[3][0] = 0.0
@@ -252,16 +265,20 @@ def follow(rod, field, bends, n, Rc, R, r, goal, J, held):  # type: ignore[no-un
             elif found:
                 there = morse_index(rod, field, ahead, COARSE * n, R, r)
         if there == index or (there >= 0 and jump < SURE):
-            bend[:] = secant
+            for i in range(6):
+                bend[i, 0] = secant[i, 0]
             _turn(Rb, R, secant)
-            secant[3:, 0] = r - rb
-            secant /= jump
-            bend[:] = (secant - bend) * (1.0 / (jump + last) if last > 0.0 else 0.0)
+            for i in range(3):
+                secant[3 + i, 0] = r[i] - rb[i]
+            share = 1.0 / (jump + last) if last > 0.0 else 0.0
+            for i in range(6):
+                secant[i, 0] /= jump
+                bend[i, 0] = (secant[i, 0] - bend[i, 0]) * share
             index, load, last = there, ahead, jump
             jump *= 2.0 if eager else 1.0
             eager = True
         else:
-            R[:], r[:] = Rb, rb
+            _put(R, r, Rb, rb)
             jump *= 0.5
             eager = False
             if jump < MIN_LOAD_STEP:
@@ -300,7 +317,7 @@ def solve_pose(rod, field, n, Rc, R, r, goal, held):  # type: ignore[no-untyped-
         load, lost = 0.0, True
         for bends in (0.0, 1.0):
             if lost:
-                R[:], r[:] = R0, r0
+                _put(R, r, R0, r0)
                 index, load = follow(rod, field, bends, n, Rc, R, r, goal, J, held)
                 steep = load < 1.0 and np.max(np.abs(J)) > STEEP
                 lost = index == LOST or steep
@@ -310,7 +327,9 @@ def solve_pose(rod, field, n, Rc, R, r, goal, held):  # type: ignore[no-untyped-
         moved = math.inf if k > 0 else 0.0
         run(rod, field, 1.0, 2.0 * n, R, r, False, moved, held)
         _miss(held[0][0], Rc, x)
-        error = np.sum(np.abs(x))
+        error = 0.0
+        for i in range(6):
+            error += abs(x[i, 0])
         solve6(J.copy(), x)
         error += _move(R, r, x)
         if error < ROUGH:
@@ -320,7 +339,7 @@ def solve_pose(rod, field, n, Rc, R, r, goal, held):  # type: ignore[no-untyped-
     return index, 1.0, error + 1e-15 * n
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def solve_sure(rod, field, n, Rc, R, r, goal):  # type: ignore[no-untyped-def]
     """Find the pose as `solve_pose`; believe what finer steps agree on.
 

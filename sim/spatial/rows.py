@@ -55,7 +55,7 @@ def _leaves(rod, n, curve, box, s, states):  # type: ignore[no-untyped-def]
 @njit(cache=True, inline="always")
 def _solve(rod, field, Rc, margin, box, R, r, s, states):  # type: ignore[no-untyped-def]
     """Return outcome, Morse index and error of one rod, and leave its tip's pose."""
-    reach, turn = loads_on(rod, field, Rc[:, 2])
+    reach, turn = loads_on(rod, field, Rc[:, 2].copy())
     if not turn <= TURN_LIMIT:
         return BEYOND, -1, math.nan
     if turn > 0.0 or in_reach(field, margin):
