@@ -47,9 +47,11 @@ $(VENV)/.created:
 	$(PYTHON) -m venv $(VENV)
 	touch $@
 
+# Not compiled by pip, whole packages one after the other: the little that is imported is
+# compiled then.
 $(VENV)/.ready: $(VENV)/.created pyproject.toml constraints.txt
 	@echo "installing magbend and its pinned dependencies into $(VENV) (once, about a minute)"
-	$(PIP) --constraint constraints.txt --editable .
+	$(PIP) --no-compile --constraint constraints.txt --editable .
 	touch $@
 
 $(VENV)/.ready-test: $(VENV)/.created pyproject.toml constraints.txt
