@@ -255,13 +255,13 @@ def check(seed: int) -> None:
     assert moment == pytest.approx(space.root_moment_Nm, rel=1e-7, abs=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_random_rods_agree_with_shooting(seed: int) -> None:
     check(seed)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(6, 300))
+@pytest.mark.parametrize("seed", range(2, 300))
 def test_more_random_rods_agree_with_shooting(seed: int) -> None:
     check(seed)
 
