@@ -40,6 +40,10 @@ MOST = 50_000
 
 _LOCK = threading.RLock()
 _calls_left: ContextVar[list[int] | None] = ContextVar("calls_left", default=None)
+_direct: list[Kernel] = []
+"""Kernels whose calls go to numba's dispatcher: none while a task runs as written."""
+_as_written = 0
+"""Tasks that do, in any thread."""
 
 
 class _Unfit(BaseException):
@@ -57,10 +61,14 @@ class Kernel:
         Of `numba.njit`.
     """
 
+    # Looked up by C in a slot: a method of Python's own doubles the cost of a call.
+    __slots__ = ("__call__", "__dict__")
+    __call__: Callable[..., Any]
     __name__: str
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         functools.update_wrapper(self, function)
+        self.__call__ = self._called
         self._function = function
         self._options = options
         self._compiled: Any = None
@@ -159,11 +167,16 @@ class Kernel:
         """Pickle as the name that another process imports."""
         return self._function.__qualname__
 
-    def __call__(self, *args: Any) -> Any:
-        """Run compiled or, within `once`, as written."""
+    def _called(self, *args: Any) -> Any:
+        """Run compiled, from now on directly; or, within `once`, as written."""
         left = _calls_left.get()
         if left is None:
-            return (self._compiled or self.compiled)(*args)
+            compiled = self.compiled
+            with _LOCK:
+                if not _as_written:
+                    self.__call__ = compiled
+                    _direct.append(self)
+            return compiled(*args)
         left[0] -= 1
         if left[0] < 0:
             raise _Unfit
@@ -285,19 +298,32 @@ def once(task: Callable[[], Result], *, patience: int | None = None) -> Result:
     patience : int, optional
         Calls of kernels that are not too long; `PATIENCE` by default.
     """
+    with suppress(_Unfit), _written(PATIENCE if patience is None else patience):
+        return task()
+    return task()
+
+
+@contextmanager
+def _written(calls: int) -> Iterator[None]:
+    """Let kernels run as written in this context, so often."""
     import numpy as np
 
-    token = _calls_left.set([PATIENCE if patience is None else patience])
+    global _as_written
+    with _LOCK:
+        _as_written += 1
+        while _direct:
+            kernel = _direct.pop()
+            kernel.__call__ = kernel._called
+    token = _calls_left.set([calls])
     try:
         with np.errstate(all="ignore"), warnings.catch_warnings():
             # Machine code says nothing of empty slices either.
             warnings.simplefilter("ignore", RuntimeWarning)
-            return task()
-    except _Unfit:
-        pass
+            yield
     finally:
         _calls_left.reset(token)
-    return task()
+        with _LOCK:
+            _as_written -= 1
 
 
 def plain_first(

@@ -9,6 +9,7 @@ import sys
 import threading
 import warnings
 from contextlib import ExitStack
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -98,6 +99,24 @@ def test_long_work_goes_on_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
     assert once(task) == power_sum(1.0, 8)
     assert starts == [True, False]
     assert jit._calls_left.get() is None
+
+
+def test_calls_go_straight_to_machine_code_but_within_once() -> None:
+    kernel = jit.Kernel(lambda x: x + 1, {})
+    assert kernel(1.0) == 2.0
+    assert kernel.__call__ is kernel.compiled
+    half = Fraction(1, 2)  # nothing that machine code takes
+    assert once(lambda: kernel(half)) == half + 1
+    other = threading.Thread(target=lambda: kernel(1.0))
+
+    def task() -> Fraction:
+        other.start()
+        other.join()
+        return kernel(half)
+
+    assert once(task) == half + 1
+    assert kernel(1.0) == 2.0
+    assert kernel.__call__ is kernel.compiled
 
 
 def test_what_python_refuses_is_left_to_machine_code() -> None:
