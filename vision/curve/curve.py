@@ -102,7 +102,9 @@ def beside(points: Array, theta: Array, offset: Array) -> Array:
 
 def arc_lengths(points: Array) -> Array:
     """Return the arc length at the points (n, 2) of a polyline."""
-    return np.append(0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T)))
+    lengths = np.zeros(len(points))
+    np.cumsum(np.hypot(*(points[1:] - points[:-1]).T), out=lengths[1:])
+    return lengths
 
 
 def on_polyline(along: Array, s: Array, points: Array) -> Array:

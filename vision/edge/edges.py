@@ -29,6 +29,9 @@ from .profiles import STEP_PX, _sample
 Array = NDArray[np.float64]
 Image = NDArray[np.float32]
 
+LEAST = 0.6
+"""Distance of a width from the median, px, that is of use in any case."""
+
 _SHADE = 0.003
 """Slope of the paper beside a rod, per px and contrast, that is no shade yet."""
 
@@ -88,14 +91,14 @@ class Edges(NamedTuple):
         return np.asarray(_blurs(self, parts))
 
     def usable(
-        self, walls: Array | float = 0.0, *, least: float = 0.6
+        self, walls: Array | float = 0.0, *, least: float = LEAST
     ) -> NDArray[np.bool_]:
         """Stations with both edges, of a width like the others' but for side walls.
 
         Those whose width is within `least` px of the median are of use in any case.
         """
         wide = self.width - walls
-        return np.asarray(_alike(wide, least))
+        return np.asarray(alike(wide, least))
 
     def wander(self, lag: int) -> float:
         """How much an edge jumps from one station to the one `lag` stations on, px."""
@@ -121,7 +124,7 @@ def _blurs(edges: Edges, parts: int) -> Array:
 
 
 @njit(cache=True)
-def _alike(width: Array, least: float) -> NDArray[np.bool_]:
+def alike(width: Array, least: float) -> NDArray[np.bool_]:
     """Whether widths are within 5 deviations of the median, or `least`."""
     away = np.abs(width - _median(width))
     return np.asarray(away < max(5.0 * 1.4826 * _median(away), least))
@@ -181,7 +184,7 @@ def find_edges(
     Edges
         NaN where no edge was found.
     """
-    edge = np.stack([low, high])
+    edge = np.array([low, high])
     blurs = np.atleast_1d(np.asarray(blur, dtype=np.float64))
     out = _both_sides(
         grey, points, normals, edge, float(reach), blurs, float(fuzz), sign, smooth

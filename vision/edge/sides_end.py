@@ -10,18 +10,20 @@ on the clamp, is another thing.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..curve.curve import Curve, normals_of
-from ..curve.robust import median
+from ...core.jit import njit
+from ..curve.curve import Curve, beside, points_at
+from ..curve.robust import _median
 
 Array = NDArray[np.float64]
 
-_ON, _BESIDE = np.array([-0.25, 0.0, 0.25]), np.array([0.0, 0.5, 1.0])
+_ON, _BESIDE = (-0.25, 0.0, 0.25), (0.0, 0.5, 1.0)
 """Lanes on the rod, in widths from its axis, and beside it, as parts of the room."""
 
 _CLEAR, _CLEAR_PX, _OUT, _OUT_PX = 0.15, 2.0, 0.6, 4.0
@@ -82,58 +84,94 @@ def sides_end(
     SidesEnd or None
         None where no place tells.
     """
+    s, spots = _spots(curve, float(expected), float(width))
+    light = np.asarray(light_at(spots), np.float64)
+    place, is_clear = _found(light, s, float(expected), float(width), curve.s[-1])
+    return None if math.isnan(place) else SidesEnd(place, is_clear)
+
+
+@njit(cache=True)
+def _spots(curve: Curve, expected: float, width: float) -> tuple[Array, Array]:
+    """Return arc lengths, (n,), and places on, left and right of a rod, (3, 3, n, 2).
+
+    Three lanes each.
+    """
     step = max(width / _STEP, 1.0)
-    length = float(curve.s[-1]) - expected
+    length = curve.s[-1] - expected
     s = np.arange(
         expected - _BEHIND * width, expected + min(_AHEAD * width, 0.9 * length), step
     )
-    contrast = _contrast(light_at, curve, s, width)
-    low, high = (expected + min(far * width, share * length) for far, share in _KNOWN)
-    usual = median(contrast[np.searchsorted(s, low) : np.searchsorted(s, high) + 1])
+    first = 0.5 * width + max(_CLEAR * width, _CLEAR_PX)
+    room = max(_OUT * width, _OUT_PX)
+    points, theta = points_at(curve, s)
+    spots = np.empty((3, 3, s.size, 2))
+    for k in range(3):
+        aside = first + room * _BESIDE[k]
+        for side, across in enumerate((_ON[k] * width, -aside, aside)):
+            spots[side, k] = beside(points, theta, np.full(s.size, across))
+    return s, spots
+
+
+@njit(cache=True)
+def _found(
+    light: Array, s: Array, expected: float, width: float, last: float
+) -> tuple[float, bool]:
+    """Return where both sides end, NaN if nowhere; and whether that is clear."""
+    contrast = _contrast(_lights(light))
+    low, high = [
+        expected + min(far * width, share * (last - expected)) for far, share in _KNOWN
+    ]
+    usual = _median(contrast[np.searchsorted(s, low) : np.searchsorted(s, high) + 1])
     if not usual > 0.0:
-        return None
-    seen = np.append(0.0, np.cumsum(np.minimum(contrast / (_ENOUGH * usual), 1.0)))
-    n = max(round(width / step), 2)
-    middle = seen[n:-n]
-    better = (seen[2 * n :] + seen[: -2 * n] - 2.0 * middle) / n
+        return np.nan, False
+    seen = np.zeros(s.size + 1)
+    seen[1:] = np.cumsum(np.minimum(contrast / (_ENOUGH * usual), 1.0))
+    n = max(round(width / (s[1] - s[0])), 2)
+    better = (seen[2 * n :] + seen[: -2 * n] - 2.0 * seen[n:-n]) / n
     sure = np.flatnonzero(better > _SURE)
     if sure.size == 0:
-        return None
+        return np.nan, False
     # The first from the tip: what is seen behind a gap is another thing.
-    best = int(sure[-1])
+    best = sure[-1]
     while best > 0 and better[best - 1] >= better[best]:
         best -= 1
     place, near = n + best, max(n // 2, 2)
-    is_clear = median(contrast[place : place + near]) > _ENOUGH * usual
-    return SidesEnd(_half_way(s, contrast, place, near), is_clear)
+    is_clear = _median(contrast[place : place + near]) > _ENOUGH * usual
+    return _half_way(s, contrast, place, near), is_clear
 
 
+@njit(cache=True)
 def _half_way(s: Array, contrast: Array, place: int, near: int) -> float:
     """Return where contrast is half way from what it is behind a place to before it."""
     low, high = max(place - near, 0), place + near
-    half = 0.5 * (median(contrast[low:place]) + median(contrast[place:high]))
+    half = 0.5 * (_median(contrast[low:place]) + _median(contrast[place:high]))
     past = contrast[low:high] >= half
     rises = low + np.flatnonzero(~past[:-1] & past[1:])
     if rises.size == 0:
         return float(s[place])
-    k = int(rises[np.argmin(np.abs(rises - place))])
+    k = rises[np.argmin(np.abs(rises - place))]
     part = (half - contrast[k]) / (contrast[k + 1] - contrast[k])
     return float(s[k] + part * (s[k + 1] - s[k]))
 
 
-def _contrast(
-    light_at: Callable[[Array], Array], curve: Curve, s: Array, width: float
-) -> Array:
+@njit(cache=True)
+def _lights(light: Array) -> Array:
+    """Return logarithms of light on a rod and at its left and right, (3, n, c)."""
+    lights = np.empty((3, *light.shape[2:]))
+    for side in range(3):
+        for i in range(light.shape[2]):
+            for colour in range(light.shape[3]):
+                middle = np.median(light[side, :, i, colour])
+                lights[side, i, colour] = np.log(max(middle, 0.0) + _LEAST_LIGHT)
+    return lights
+
+
+@njit(cache=True)
+def _contrast(lights: Array) -> Array:
     """Return by how much a rod differs from both of its sides, alike; 0 if from one.
 
     The geometric mean: where light changes evenly across, one step is up and one down.
     """
-    first = 0.5 * width + max(_CLEAR * width, _CLEAR_PX)
-    beside = first + max(_OUT * width, _OUT_PX) * _BESIDE
-    across = np.array((_ON * width, -beside, beside))
-    points, theta = curve.at(s)
-    spots = points + across[..., None, None] * normals_of(theta)
-    light = np.log(np.maximum(light_at(spots), 0.0) + _LEAST_LIGHT)
-    middle, left, right = np.sort(light, axis=1)[:, 1]  # the medians of three
+    middle, left, right = lights
     steps = np.sum((middle - left) * (middle - right), axis=-1)
     return np.asarray(np.sqrt(np.maximum(steps, 0.0)))

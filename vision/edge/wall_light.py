@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.jit import njit
-from .edges import Edges
+from .edges import LEAST, Edges, alike
 from .levels import level_spans
 from .state import Seen, State
 
@@ -55,23 +55,19 @@ def to_wall_ends(state: State, seen: Seen, walls: Walls) -> Seen:
     """
     places = np.linspace(seen.s[0], seen.s[-1], WALL_PLACES)
     wall, gap = walls(*state.curve.at(places), state.width)
-    low, high, wide = _moved(
+    low, high, good = _moved(
         seen.edges, wall, gap, state.width, float(seen.s[1]), state.blur, state.fuzz,
         MIRRORED, SKY,
     )  # fmt: skip
-    moved = seen.edges._replace(low=low, high=high)
-    flat, round_ = moved.usable(wide), moved.usable()
-    more = np.count_nonzero(round_) > _MANY_MORE * np.count_nonzero(flat)
-    good = round_ if more else flat
-    return replace(seen, edges=moved, good=good)
+    return replace(seen, edges=seen.edges._replace(low=low, high=high), good=good)
 
 
 @njit(cache=True)
 def _moved(
     edges: Edges, wall: Array, gap: Array, width: float, step: float, blur: float,
     fuzz: float, mirrored: float, sky: float,
-) -> tuple[Array, Array, Array]:  # fmt: skip
-    """Return both edges moved to the ends of walls, and how wide the wall is seen."""
+) -> tuple[Array, Array, NDArray[np.bool_]]:  # fmt: skip
+    """Return both edges moved to the ends of walls, and which are of use."""
     top, paper, slope = _levels_at(
         wall, 0.5 * width / step, edges.inner, edges.outer_low, edges.outer_high,
         edges.shade_low, edges.shade_high,
@@ -93,7 +89,9 @@ def _moved(
         else:
             high[k] += by
         wide[k] = abs(at)
-    return low, high, wide
+    flat, round_ = alike(high - low - wide, LEAST), alike(high - low, LEAST)
+    more = np.sum(round_) > _MANY_MORE * np.sum(flat)
+    return low, high, round_ if more else flat
 
 
 @njit(cache=True)

@@ -15,7 +15,7 @@ from ..curve.robust import _median, median
 from ..edge.clamp import ClampLines
 from ..edge.clamp_light import clamp_light
 from ..edge.crossings import EndFace
-from ..edge.edges import find_edges
+from ..edge.edges import LEAST, find_edges
 from ..edge.ends import find_ends
 from ..edge.own_width import to_own_width
 from ..edge.state import LostError, Root, Seen, State
@@ -255,7 +255,7 @@ def _look(grey: Image, state: State, sign: float, turn: int, *, seeking: bool) -
         blur=state.blur if state.blurs is None else state.blurs, fuzz=fuzz, sign=sign,
         smooth=int(6.0 / step),
     )  # fmt: skip
-    good = edges.usable(least=FLARED * width if state.rough else 0.6)
+    good = edges.usable(least=FLARED * width if state.rough else LEAST)
     bare = ~covered(points, state.hidden)
     good &= bare
     if good.sum() < max(8.0, 0.4 * bare.sum()):

@@ -73,9 +73,9 @@ class Strip:
     @cached_property
     def profiles(self) -> Array:
         """The mean light across each part of a candidate, shape (PARTS, k)."""
-        parts = self.light.reshape(len(self.across), PARTS, -1)
-        share = np.full(parts.shape[2], 1.0 / parts.shape[2])
-        return np.ascontiguousarray((parts @ share).T)
+        parts = self.light.reshape(len(self.across) * PARTS, -1)
+        share = np.full(parts.shape[1], 1.0 / parts.shape[1])
+        return np.ascontiguousarray((parts @ share).reshape(-1, PARTS).T)
 
     def between(self, first: float, last: float) -> slice:
         """Return the stations from one arc length to another, the nearest at least."""

@@ -58,30 +58,42 @@ def rod_alone(strip: Strip, candidate: Candidate, width: float) -> Candidate | N
     across = strip.across * strip.width
     near = np.abs(across) < 0.6 * width + 2.0 * clear
     across, light = across[near], strip.profiles[:, near]
-    dark, paper = light.min(axis=1), light.max(axis=1)
-    if median(paper) < 0.0:  # a light rod, farther from shade than from the board
+    if (
+        median(light.max(axis=1)) < 0.0
+    ):  # a light rod, farther from shade than from the board
         return None
-    body = light < (dark + _EDGE * (paper - dark))[:, None]
-    low, high = across[body.argmax(axis=1)], across[-1 - body[:, ::-1].argmax(axis=1)]
-    inside = (across > low[:, None] + clear) & (across < high[:, None] - clear)
-    darkest = np.where(inside, light, np.inf).min(axis=1)
-    lightest = np.where(inside, light, -np.inf).max(axis=1)
-    varies = lightest - darkest > _STEP * (paper - dark)
-    closed = ~(body[:, 0] | body[:, -1])  # else a soft shade, no edge was taken for
     middle = strip.s.reshape(PARTS, -1).mean(axis=1)
-    found = []
-    for k in np.flatnonzero(varies & closed):  # in nearly all rods nowhere
-        part = across[inside[k]], light[k, inside[k]]
-        place, rise = _step(*part, paper[k], _NARROW * width, clear)
-        if rise != 0.0:
-            ends = (low[k], place) if rise > 0.0 else (place, high[k])
-            found.append((middle[k], *ends))
+    found = _steps(across, light, middle, float(width), clear)
     if len(found) < _LEAST_PARTS * PARTS:
         return None
-    s, low, high = np.array(found).T
+    s, low, high = found.T
     aside = np.interp(strip.s, s, 0.5 * (low + high))
     points = beside(strip.points, strip.theta, aside)
     return replace(candidate, points_px=points, width_px=median(high - low))
+
+
+@njit(cache=True)
+def _steps(
+    across: Array, light: Array, middle: Array, width: float, clear: float
+) -> Array:
+    """Return middle, low and high edge of the darker body in each part with a step."""
+    found, count = np.empty((len(light), 3)), 0
+    for k in range(len(light)):
+        dark, paper = np.min(light[k]), np.max(light[k])
+        body = np.flatnonzero(light[k] < dark + _EDGE * (paper - dark))
+        if body[0] == 0 or body[-1] == across.size - 1:
+            continue  # a soft shade, no edge was taken for
+        low, high = across[body[0]], across[body[-1]]
+        inside = (across > low + clear) & (across < high - clear)
+        profile = light[k][inside]
+        if profile.size == 0 or np.ptp(profile) <= _STEP * (paper - dark):
+            continue  # as in nearly all rods
+        place, rise = _step(across[inside], profile, paper, _NARROW * width, clear)
+        if rise != 0.0:
+            ends = (low, place) if rise > 0.0 else (place, high)
+            found[count] = middle[k], ends[0], ends[1]
+            count += 1
+    return found[:count]
 
 
 @njit(cache=True)

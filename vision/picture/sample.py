@@ -21,8 +21,11 @@ def nearest_pixels(image: NDArray[Any], places: Array) -> NDArray[Any]:
     places : ndarray, shape (..., 2)
         Where (x, y); those beyond the picture are taken at its border.
     """
-    last = np.array(image.shape[1::-1]) - 1
-    x, y = np.moveaxis(np.rint(places).astype(int).clip(0, last), -1, 0)
+    nearest, (height, width) = np.rint(places).astype(np.intp), image.shape[:2]
+    x, y = (  # far quicker than `clip`
+        np.minimum(np.maximum(nearest[..., k], 0), size - 1)
+        for k, size in enumerate((width, height))
+    )
     return np.asarray(image[y, x])
 
 
