@@ -75,11 +75,21 @@ class SpecimenModel(FileModel):
 
     def model_post_init(self, _context: object) -> None:
         """Check that the sizes are those of the shape."""
-        for name in SIZES[self.shape]:
-            if getattr(self, name) is None:
-                raise ValueError(f"{name!r} is missing: the shape is {self.shape}")
+        missing = [name for name in SIZES[self.shape] if getattr(self, name) is None]
+        if missing:
+            what = f"{missing[0]!r} is missing: the shape is {self.shape}"
+            raise ValueError(f"{what}{self._other_shape()}")
         if bool(self.section) == (self.profile is not None):
             raise ValueError("give either [[section]] tables or one [profile]")
+
+    def _other_shape(self) -> str:
+        """Return words for the shape that the given sizes belong to, if there is one."""
+        fits = [
+            shape
+            for shape, sizes in SIZES.items()
+            if all(getattr(self, name) is not None for name in sizes)
+        ]
+        return f'; these sizes belong to shape = "{fits[-1]}"' if fits else ""
 
     def specimen(self) -> Specimen:
         """Return the specimen it describes."""

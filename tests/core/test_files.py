@@ -61,6 +61,8 @@ def test_a_specimen_survives_the_round_trip(tmp_path: Path) -> None:
         ("side_mm = 1.0", "side = 1.0", ["line 2", "'side'", "unit", "'side_mm'"]),
         ("side_mm = 1.0", "sidemm = 1.0", ["line 2", "did you mean 'side_mm'"]),
         ("side_mm = 1.0", "", ["'side_mm' is missing"]),
+        ("side_mm = 1.0", "diameter_mm = 1.0", ["is missing", 'shape = "round"']),
+        ("side_mm", "bore_mm = 0.5\ndiameter_mm", ["is missing", 'shape = "tube"']),
         ("side_mm = 1.0", "side_mm = 1.0\ncolour = 'tan'", ["#c8af8c", "'tan'"]),
         ("side_mm = 1.0", "side_mm = 1.0\npoisson_ratio = 5", ["-0.99 to 0.5", "5"]),
         ("E_MPa = 15.0", "E_MPa = -15.0", ["line 11", "E_MPa", "-15.0"]),
