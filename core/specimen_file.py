@@ -83,7 +83,7 @@ class SpecimenModel(FileModel):
             raise ValueError("give either [[section]] tables or one [profile]")
 
     def _other_shape(self) -> str:
-        """Return words for the shape that the given sizes belong to, if there is one."""
+        """Return words for the shape that the given sizes belong to, if any."""
         fits = [
             shape
             for shape, sizes in SIZES.items()

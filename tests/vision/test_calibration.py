@@ -167,8 +167,8 @@ def test_saved_calibration_comes_back(tmp_path):
 @pytest.mark.parametrize("told", [None, 0.0, 0.9])
 def test_a_rod_height_that_was_told_is_one_that_comes_back(tmp_path, told):
     path = tmp_path / "calibration.json"
-    write_calibration(replace(scene_camera(), rod_height_mm=told), path)
-    assert read_calibration(path).rod_height_mm == told
+    write_calibration(replace(scene_camera(), rod_height_mm=told), str(path))
+    assert read_calibration(str(path)).rod_height_mm == told
     # Files of before wrote 0 where nobody had told it.
     before = path.read_text().replace('"schema": 2', '"schema": 1')
     path.write_text(before.replace('"rod_height_mm": null', '"rod_height_mm": 0.0'))

@@ -71,7 +71,7 @@ class CalibrationModel(FileModel):
     clamp_tag: TagModel | None = None
 
 
-def write_calibration(calibration: Calibration, path: Path) -> None:
+def write_calibration(calibration: Calibration, path: Path | str) -> None:
     """Write `calibration` as JSON, whole or not at all."""
     data = {
         "schema": 2,
@@ -101,10 +101,10 @@ def write_calibration(calibration: Calibration, path: Path) -> None:
         "orientation": calibration.orientation,
         "clamp_tag": calibration.clamp_tag and asdict(calibration.clamp_tag),
     }  # fmt: skip
-    write_json(path, data)
+    write_json(Path(path), data)
 
 
-def read_calibration(path: Path) -> Calibration:
+def read_calibration(path: Path | str) -> Calibration:
     """Read what `write_calibration` wrote.
 
     Raises
@@ -113,6 +113,7 @@ def read_calibration(path: Path) -> Calibration:
         If the file is missing, a key is missing, unknown or impossible, or the numbers
         do not make a camera.
     """
+    path = Path(path)
     if not path.exists():
         raise ConfigError(
             f"{path}: there is no such file; name yours, or write one: "
