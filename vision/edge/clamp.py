@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from ...core.jit import njit
 from ..curve.curve import Curve
 from ..curve.robust import median
 from .crossings import Crossed, EndFace, crossings_of, line_through
+from .front_line import whole_front
 from .lanes import lanes_along
 from .levels import clear_of
 from .step_line import SPAN, STEP_PX, fit_step
@@ -55,6 +57,9 @@ end that is seen on the rod, as where a lamp from one side lights but half of it
 
 _SQUEEZED = 0.7
 """Part of its length that a lane inside a bend has lost where it tells nothing more."""
+
+_FRONT_PX = 4.0
+"""How far off its place the rest of a front is sought."""
 
 _LEAST_PX = 0.8
 """Blur for which a lane's own levels are sought at least: fewer samples do not tell."""
@@ -201,13 +206,28 @@ def find_front(
 ) -> EndFace | None:  # fmt: skip
     """Find the clamp's front beside the rod; see `find_clamp`."""
     near, wide = clear_of(blur), max(blur, _LEAST_PX)
-    return fit_step(
+    fit = partial(
+        fit_step, blur=blur, inner=_CLAMP_SPAN * wide, outer=SPAN * wide, own=True,
+        fine=fine,
+    )  # fmt: skip
+    front = fit(
         _front(
-            grey, curve, expected + 0.5 * ahead, _span(reach, blur) + 0.5 * ahead,
-            (_BESIDE if fine else _BESIDE[::2]) * width, near, contrast,
-            reach + 0.5 * ahead, sign,
-        ),
-        blur=blur, inner=_CLAMP_SPAN * wide, outer=SPAN * wide, own=True, fine=fine,
+            grey,
+            curve,
+            expected + 0.5 * ahead,
+            _span(reach, blur) + 0.5 * ahead,
+            (_BESIDE if fine else _BESIDE[::2]) * width,
+            near,
+            contrast,
+            reach + 0.5 * ahead,
+            sign,
+        )
+    )
+    if front is None or not fine or front.rise <= 0.0 or front.bulge:
+        return front
+    return whole_front(
+        grey, curve, front, fit, width=width, near=near, span=_span(_FRONT_PX, blur),
+        sign=sign,
     )  # fmt: skip
 
 
