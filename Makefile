@@ -12,6 +12,9 @@ OUT    ?= demo
 BIN    := $(VENV)/bin
 PIP    := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
+# Imports keep what they compile, else each of the many processes would compile it anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo test check docs mutants release clean
 .DEFAULT_GOAL := demo
 
@@ -47,8 +50,8 @@ $(VENV)/.created:
 	$(PYTHON) -m venv $(VENV)
 	touch $@
 
-# Not compiled by pip, whole packages one after the other: the little that is imported is
-# compiled then.
+# pip would compile every module of every package, one after the other; the imports
+# compile the few that are used.
 $(VENV)/.ready: $(VENV)/.created pyproject.toml constraints.txt
 	@echo "installing magbend and its pinned dependencies into $(VENV) (once, about a minute)"
 	$(PIP) --no-compile --constraint constraints.txt --editable .
