@@ -83,7 +83,7 @@ class Motion:
         Of the three, of the point that moves most, in px.
     push_px : float
         Standard deviation of the change of an acceleration from frame to frame.
-    seen_px : ndarray, shape (k, n, 2)
+    seen_px : tuple of ndarray, shape (n, 2)
         The points as measured in the last frames, four at most.
     beats_px2 : tuple of float
         What these told of the frequency at which it swings.
@@ -94,7 +94,7 @@ class Motion:
     state: NDArray[np.complex128]
     covariance: NDArray[np.float64]
     push_px: float
-    seen_px: NDArray[np.float64]
+    seen_px: tuple[NDArray[np.float64], ...]
     beats_px2: tuple[float, float]
     looked: Measurement
 

@@ -178,3 +178,43 @@ def test_what_comes_across_a_followed_rod_or_to_its_tip_is_seen(first, at):
     else:
         assert found.flags == extract(as_photo(image), SETTING.calibration).flags
         assert not found.ok
+
+
+def swing(k):
+    return 40.0 + 8.0 * float(np.cos(0.3 * k))
+
+
+@pytest.fixture(scope="module")
+def swinging():
+    """Return the last of frames of a swing that is foreseen."""
+    found = None
+    for k in range(22):
+        found = follow(as_photo(frame(swing(k), seed=k).image), SETTING, found)
+    return found
+
+
+def test_a_swing_that_is_foreseen_is_looked_at_once(swinging, monkeypatch):
+    looks, look = [], refine_module._look
+
+    def noted(*args, **options):
+        looks.append(args)
+        return look(*args, **options)
+
+    monkeypatch.setattr(refine_module, "_look", noted)
+    drawn = frame(swing(22), seed=22)
+    assert error_px(follow(as_photo(drawn.image), SETTING, swinging), drawn) < 0.03
+    assert len(looks) == 1
+
+
+@pytest.mark.parametrize(
+    ("at", "light"),
+    [((181.2, 519.1), 1.0), ((180.0, 524.0), 1.0), (AT, 0.7)],
+)
+def test_a_push_of_the_camera_or_another_light_shows_in_the_same_frame(
+    swinging, at, light
+):
+    drawn = frame(swing(22), at=at, seed=22)
+    image = np.rint(drawn.image * light).astype(np.uint8)
+    found = follow(as_photo(image), SETTING, swinging)
+    assert error_px(found, drawn) < 0.03
+    np.testing.assert_allclose(found.clamp_px, drawn.truth.clamp_px, atol=0.25)

@@ -14,6 +14,7 @@ or a jump.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -66,7 +67,7 @@ def begun(found: Measurement) -> Measurement:
     motion = Motion(
         state=np.stack([pieces, np.zeros_like(pieces), np.zeros_like(pieces)]),
         covariance=np.diag([SEEN_PX, speed, 0.3 * speed]) ** 2, push_px=0.1 * speed,
-        seen_px=found.points_px[None], beats_px2=(0.0, 0.0), looked=found,
+        seen_px=(found.points_px,), beats_px2=(0.0, 0.0), looked=found,
     )  # fmt: skip
     return replace(found, motion=motion)
 
@@ -95,19 +96,20 @@ def moved_on(
     step = _step(motion)
     state, covariance = step @ motion.state, _covariance(motion, step)
     variance = covariance[0, 0] + SEEN_PX**2
-    off = found.points_px - points_of(state[0])
-    largest = float(np.hypot(*off.T).max())
+    points = found.points_px
+    off = points - points_of(state[0])
+    largest = math.sqrt(float((off * off).sum(axis=1).max()))
     if largest > GATE * math.sqrt(variance):
         return None
-    innovation = _less_turns(pieces_of(found.points_px) - state[0])
+    innovation = _less_turns(pieces_of(points) - state[0])
     gain = covariance[:, 0] / variance
     # What the innovation has beyond an acceleration held is the push of this frame.
     held = variance - (_PUSHED[0] * motion.push_px) ** 2
     push = max(largest**2 - held, 0.0) / _PUSHED[0] ** 2
     push = (1.0 - FORGET) * motion.push_px**2 + FORGET * push
-    seen_px = np.concatenate([motion.seen_px[-3:], found.points_px[None]])
+    seen_px = (*motion.seen_px[-3:], points)
     updated = Motion(
-        state=state + np.outer(gain, innovation),
+        state=state + gain[:, None] * innovation,
         covariance=covariance - np.outer(gain, covariance[0]),
         push_px=max(math.sqrt(push), LEAST_PUSH_PX),
         seen_px=seen_px, beats_px2=_beats(motion.beats_px2, seen_px), looked=looked,
@@ -122,7 +124,9 @@ def _less_turns(change: Pieces) -> Pieces:
     return np.asarray(change - 2j * np.pi * turns)
 
 
-def _beats(before: tuple[float, float], seen_px: Array) -> tuple[float, float]:
+def _beats(
+    before: tuple[float, float], seen_px: Sequence[Array]
+) -> tuple[float, float]:
     """Return how much velocities change, and how large they are, by the last frames.
 
     Both are mean products with d1, px^2, of the differences between four frames in
@@ -131,9 +135,13 @@ def _beats(before: tuple[float, float], seen_px: Array) -> tuple[float, float]:
     """
     if len(seen_px) < 4:
         return before
-    d0, d1, d2 = np.diff(seen_px, axis=0)
-    changed, moved = np.mean(d1 * (2.0 * d1 - d2 - d0)), np.mean(d1**2)
-    return KEPT * before[0] + float(changed), KEPT * before[1] + float(moved)
+    x0, x1, x2, x3 = seen_px
+    d1 = x2 - x1
+    changed, moved = float(np.vdot(d1, 3.0 * d1 - x3 + x0)), float(np.vdot(d1, d1))
+    return (
+        KEPT * before[0] + changed / d1.size,
+        KEPT * before[1] + moved / d1.size,
+    )
 
 
 def _step(motion: Motion) -> Array:
