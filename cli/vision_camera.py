@@ -16,6 +16,9 @@ from .vision_show import calibration_facts, tell_calibration, tell_tag
 if TYPE_CHECKING:
     from ..vision import Board, Calibration
 
+MOST_WIDE_MM = 3000.0
+"""Width of a picture that no bench fills."""
+
 LINEAR = typer.Option(
     None, "--linear/--no-linear",
     help="Values of the files are proportional to light; default: the curve of sRGB.",
@@ -130,6 +133,13 @@ def calibrate(
     if known_length or scale_mm_per_px is not None:
         if known_length and scale_mm_per_px is not None:
             raise typer.BadParameter("give --known-length or --scale-mm-per-px")
+        _refuse_what_only_boards_have(
+            {
+                "--print-scale": print_scale != 1.0, "--focal-px": focal_px is not None,
+                "--chessboard": bool(chessboard), "--legacy-pattern": legacy,
+                "photographs for the lens": bool(lens),
+            }
+        )  # fmt: skip
         result = _without_board(
             plane, known_length, scale_mm_per_px, camera_height_mm, rod_height_mm
         )
@@ -250,6 +260,26 @@ def _design(
     )
 
 
+def _refuse_what_only_boards_have(given: dict[str, bool]) -> None:
+    """Refuse what would change nothing where a scale is told and no board is sought."""
+    idle = [name for name, is_given in given.items() if is_given]
+    if idle:
+        raise InputError(
+            f"{', '.join(idle)}: only a photographed board has use for that, and "
+            "--known-length and --scale-mm-per-px take none; leave out one or the other"
+        )
+
+
+def _refuse_pixels_per_mm(mm_per_px: float, width_px: int) -> None:
+    """Refuse a scale that makes a bench a hall, where its inverse makes it a bench."""
+    wide_mm, else_mm = width_px * mm_per_px, width_px / mm_per_px
+    if wide_mm > MOST_WIDE_MM and else_mm < MOST_WIDE_MM:
+        raise InputError(
+            f"--scale-mm-per-px {mm_per_px:g} makes the picture {wide_mm / 1e3:.3g} m "
+            f"wide; is it in px/mm? then write {1.0 / mm_per_px:.6g}"
+        )
+
+
 def _without_board(
     plane: Path,
     known_length: str | None,
@@ -262,8 +292,10 @@ def _without_board(
 
     size_px = read_photo(plane).size_px
     if scale_mm_per_px is not None:
+        positive(scale_mm_per_px, "--scale-mm-per-px", "mm/px")
+        _refuse_pixels_per_mm(scale_mm_per_px, size_px[0])
         return scale_calibration(
-            mm_per_px=positive(scale_mm_per_px, "--scale-mm-per-px", "mm/px"),
+            mm_per_px=scale_mm_per_px,
             image_size_px=size_px,
             camera_height_mm=camera_height_mm,
             rod_height_mm=rod_height_mm,

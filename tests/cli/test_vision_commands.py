@@ -19,6 +19,7 @@ from magbend.vision.synthetic.scoring import signed_distance
 FIXTURES = Path(__file__).parents[2] / "fixtures" / "vision"
 RENDERED = Path(__file__).parents[2] / "examples" / "photographs"
 BOARD = RENDERED / "calib_D.jpg"
+SCALED = ["calibrate", BOARD, "--out", "c.json", "--scale-mm-per-px"]
 
 
 @pytest.fixture(scope="module")
@@ -188,6 +189,9 @@ def test_no_output_takes_the_place_of_what_is_read_or_of_another_result(
         (["calibrate", BOARD, "--out", "c.json", "--focal-px", "-3"], 1, "focal_px"),
         (["calibrate", BOARD, "--out", "c.json", "--known-length", "1 2"], 1, "X1,Y1"),
         (["calibrate", BOARD, "--out", "c.json", "--scale-mm-per-px", "0"], 1, "above"),
+        ([*SCALED, "0.05", "--print-scale", "1.01"], 1, "--print-scale: only a"),
+        ([*SCALED, "0.05", "--focal-px", "900"], 1, "--focal-px: only a"),
+        ([*SCALED, "20"], 1, "in px/mm? then write 0.05"),
         (["extract", "none.png"], 1, "none.png"),
         (["extract", BOARD, "--calibration", "none.json"], 1, "none.json"),
         (["extract", BOARD, "--joints-mm", "a,b"], 1, "--joints-mm"),

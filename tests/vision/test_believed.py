@@ -38,6 +38,17 @@ def test_a_rod_with_less_doubt_is_believed_unless_an_end_of_it_is_missed(
     assert better(*both[:: -1 if swapped else 1]).flags == flags
 
 
+@pytest.mark.parametrize("beside", [True, False])
+def test_of_two_things_of_which_one_has_the_other_beside_it_either_may_be_the_rod(
+    beside,
+):
+    """One level shows one wall of a tube best, and all together the other."""
+    quick = line(400.0, ("other_rod",) if beside else ())
+    points = quick.points | {"y_px": np.full(50, 130.0)}
+    whole = replace(line(390.0, SMOOTH), points=points)
+    assert ("other_rod" in better(quick, whole).flags) is beside
+
+
 @pytest.mark.parametrize(
     ("behind", "held_y", "held"),
     [(20.0, 80.0, False), (45.0, 80.0, True), (20.0, 300.0, True)],

@@ -192,6 +192,19 @@ def test_a_paler_half_beside_its_darker_shade_is_not_lost_without_a_word():
     assert "tip_goes_on" not in measured(**light).flags
 
 
+def test_a_white_half_whose_dim_side_looks_like_paper_is_not_lost_without_a_word():
+    lit, dim = (
+        np.vstack([low[200:], high[:200]])
+        for low, high in (
+            strip(20.0, *sides).reshape(2, -1, 2) for sides in ((-0.5, 0.2), (0.2, 0.5))
+        )
+    )
+    white = [((0.75,) * 3, lit), ((0.61,) * 3, dim)]
+    light = {"rod": RED, "turn_deg": 20.0, "board": 0.6}
+    assert "tip_goes_on" in measured(**light, over=white).flags
+    assert "tip_goes_on" not in measured(**light).flags
+
+
 def test_a_red_rod_in_a_jpeg_is_no_wider_than_it_is_beside_its_deep_shade():
     """JPEG keeps every other pixel's colour, which alone tells the rod from shade."""
     photo = drawn(

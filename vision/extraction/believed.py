@@ -57,7 +57,8 @@ def better(quick: Measurement, whole: Measurement) -> Measurement:
     """Return the one of two measurements that is longer, or held by a clamp.
 
     Of two with the same ends it is that with fewer flags. What ends where a rod that
-    comes in at the border leads through is a part of that.
+    comes in at the border leads through is a part of that. Of two things, such as both
+    walls of a tube, of which one has the other beside it, either may be the rod.
     """
     if "clamp_at_border" in quick.flags:
         held = not {"clamp_at_border", "no_clamp"} & set(whole.flags)
@@ -65,7 +66,7 @@ def better(quick: Measurement, whole: Measurement) -> Measurement:
         part = any(_leads_through(quick, end) for end in ends)
         return whole if held and not part else quick
     if not _same(quick, whole):
-        return whole
+        return doubted(whole) if OTHER_ROD in quick.flags else whole
     longer, shorter = sorted((quick, whole), key=lambda one: -one.length_px)
     apart = longer.length_px - shorter.length_px
     same_ends = apart < AS_LONG * longer.width_px + AS_LONG_PX

@@ -203,7 +203,7 @@ def tip_goes_on(photo: Photo, strip: Strip, refined: Refined) -> bool:
     before = across[:, strip.between(end - far, end - near)]
     paler = PALER_TIP * (median(before[::4].ravel()) - median(before[1:4].ravel()))
     beyond = across[:, strip.between(end + near, end + far)]
-    if max(_step_aside(beyond), _step_aside(-beyond)) > paler:
+    if max(_step_aside(beyond), _lit_aside(beyond)) > paler:
         return True
     return _sharp_edge(strip, end) > paler or _tinted(photo, refined)
 
@@ -211,6 +211,12 @@ def tip_goes_on(photo: Photo, strip: Strip, refined: Refined) -> bool:
 def _step_aside(light: Array) -> float:
     """Return the lesser step from the middle three of five lanes to either side."""
     step = np.minimum(light[0], light[4]) - light[1:4].max(axis=0)
+    return quantile(step, 0.25)
+
+
+def _lit_aside(light: Array) -> float:
+    """Return the same downwards; a lamp leaves one of the three as light as paper."""
+    step = np.median(light[1:4], axis=0) - np.maximum(light[0], light[4])
     return quantile(step, 0.25)
 
 
@@ -253,7 +259,7 @@ def _tinted(photo: Photo, refined: Refined) -> bool:
         lanes(np.ascontiguousarray(each), near, s, across)
         for each in np.moveaxis(light, 2, 0)
     )
-    if _step_aside(-np.minimum(np.minimum(blue, green), red)) > TINTED_TIP:
+    if _lit_aside(np.minimum(np.minimum(blue, green), red)) > TINTED_TIP:
         return True
     return any(
         _step_aside(sign * (one - other)) > TINTED_TIP
