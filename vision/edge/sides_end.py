@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.jit import njit
-from ..curve.curve import Curve, beside, points_at
+from ..curve.curve import Curve, normals_of, points_at
 from ..curve.robust import _median
 
 Array = NDArray[np.float64]
@@ -104,11 +104,12 @@ def _spots(curve: Curve, expected: float, width: float) -> tuple[Array, Array]:
     first = 0.5 * width + max(_CLEAR * width, _CLEAR_PX)
     room = max(_OUT * width, _OUT_PX)
     points, theta = points_at(curve, s)
+    normals = normals_of(theta)
     spots = np.empty((3, 3, s.size, 2))
     for k in range(3):
         aside = first + room * _BESIDE[k]
         for side, across in enumerate((_ON[k] * width, -aside, aside)):
-            spots[side, k] = beside(points, theta, np.full(s.size, across))
+            spots[side, k] = points + across * normals
     return s, spots
 
 
@@ -161,7 +162,8 @@ def _lights(light: Array) -> Array:
     for side in range(3):
         for i in range(light.shape[2]):
             for colour in range(light.shape[3]):
-                middle = np.median(light[side, :, i, colour])
+                a, b, c = light[side, :, i, colour]
+                middle = max(min(a, b), min(max(a, b), c))
                 lights[side, i, colour] = np.log(max(middle, 0.0) + _LEAST_LIGHT)
     return lights
 
