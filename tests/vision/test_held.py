@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
+from types import SimpleNamespace
+
 import cv2
 import numpy as np
 import pytest
 
 from magbend.vision import as_photo, extract
+from magbend.vision.edge.clamp import ClampLines
+from magbend.vision.edge.state import LostError
+from magbend.vision.extraction.beyond_ends import check_ends
 from magbend.vision.find.candidate import Candidate
 from magbend.vision.find.choose import find_rod
 from magbend.vision.find.held import held, seen_behind
@@ -160,6 +166,15 @@ def test_a_rod_is_seen_behind_what_lies_across_it_and_not_within_its_clamp(bar, 
         photo = as_photo(light)
         axis = axis[axis[:, 0] > 310.0]
     assert seen_behind(photo, axis[::4], WIDTH) is seen
+    yarn = SimpleNamespace(
+        rough=True, clamp=ClampLines(face=None, front=None), typical_width=WIDTH,
+        fit=SimpleNamespace(curve=SimpleNamespace(points=axis[::4])),
+    )  # fmt: skip
+    refused = (
+        pytest.raises(LostError, match="goes on behind") if seen else nullcontext()
+    )
+    with refused:
+        check_ends(photo, None, None, yarn, root="clamp")
 
 
 def test_a_rod_is_not_forgotten_for_what_only_pale_levels_show():

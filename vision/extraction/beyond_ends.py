@@ -85,6 +85,14 @@ def check_ends(
     LostError
         With flag and reason.
     """
+    axis, width = refined.fit.curve.points, refined.typical_width
+    goes_on = refined.clamp is not None and (refined.rough or _goes_on_behind(strip))
+    if goes_on and seen_behind(photo, axis, width):
+        raise LostError(
+            "touches_object",
+            "what looks like a rod goes on behind what it grows from: something "
+            "crosses it, or is crossed by it",
+        )
     if refined.rough:
         return
     if root == "border" and _ends_at_front(strip, refined):
@@ -101,13 +109,6 @@ def check_ends(
         raise LostError(
             "no_clamp",
             "what looks like a rod begins on bare paper: no clamp is seen there",
-        )
-    axis, width = refined.fit.curve.points, refined.typical_width
-    if _goes_on_behind(strip) and seen_behind(photo, axis, width):
-        raise LostError(
-            "touches_object",
-            "what looks like a rod goes on behind what it grows from: something "
-            "crosses it, or is crossed by it",
         )
     if _tip_at_body(strip, refined):
         raise LostError(
