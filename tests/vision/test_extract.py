@@ -435,3 +435,14 @@ def test_no_scribble_makes_it_raise(seed):
     result = extract(as_photo(picture), None, clamp="none")
     assert bool(result.points) == result.ok
     assert result.ok or result.reason
+
+
+@pytest.mark.parametrize(("widths", "told"), [(4, True), (9, False)])
+def test_a_stub_is_told_how_long_a_rod_is_at_least(widths, told):
+    light = np.full((400, 600), 0.7, dtype=np.float32)
+    light[120:280, :150] = 0.2
+    light[190:210, 150 : 150 + 20 * widths] = 0.02
+    grey = 255.0 * cv2.GaussianBlur(light, (0, 0), 1.0) ** (1.0 / 2.2)
+    found = extract(as_photo(grey.astype(np.uint8)), None)
+    assert found.ok is not told
+    assert ("6 times as long as wide" in found.reason) is told

@@ -15,6 +15,7 @@ from ..find.choose import find_rod, likely_rods, seen_best
 from ..find.coloured import shows_another
 from ..find.ground import View
 from ..find.held import held
+from ..find.rod import NO_ROD
 from ..find.shadeless import in_its_colour
 from ..find.sought import Sought
 from ..measurement import Measurement, failure
@@ -111,7 +112,7 @@ def _searched(photo: Photo, setting: Setting, sought: Sought) -> Measurement:
     LostError
         Of the first thing that is like a rod.
     """
-    first = LostError("no_rod", "nothing in the picture is long and thin like a rod")
+    first = LostError("no_rod", NO_ROD)
     part = None
     try:
         for rod in likely_rods(photo, sought):

@@ -23,7 +23,7 @@ from .ground import (
 from .held import as_held, held
 from .lines import beyond_lines, without_lines
 from .rivals import TOLD, alike, are_halves, bound, standing_out, too_many
-from .rod import LEAST_SHARE, find_candidates
+from .rod import LEAST_SHARE, NO_ROD, find_candidates
 from .rod_colour import distance_from
 from .shadeless import shades
 from .sought import Sought
@@ -273,7 +273,7 @@ def _choose(photo: Photo, binary: Binary, sought: Sought) -> Candidate:
             return _accept(rod)
         best = best or rod
     if best is None:
-        raise LostError("no_rod", "nothing in the picture is long and thin like a rod")
+        raise LostError("no_rod", NO_ROD)
     return best if sought.clamp == "none" else as_held(photo, best)
 
 

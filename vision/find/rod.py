@@ -25,6 +25,11 @@ Mask = NDArray[np.uint8]
 LEAST_SLENDERNESS = 6.0
 """Shortest rod, in widths."""
 
+NO_ROD = (
+    "nothing in the picture is long and thin like a rod, "
+    f"{LEAST_SLENDERNESS:.0f} times as long as wide or more"
+)
+
 LEAST_SHARE = 0.2
 """Shortest rod beside another long thin thing, over the length of that."""
 
