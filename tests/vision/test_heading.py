@@ -41,13 +41,14 @@ def test_it_is_as_sure_as_it_scatters_over_many_noises():
     assert told == pytest.approx(at_root / at_start, rel=0.25)
 
 
-def as_rod(fit, *, shaded=0.0, wider=0.0, whole=False):
-    """Return an even rod with this midline, shaded or wider within the first width."""
+def as_rod(fit, *, shaded=0.0, relit=0.0, wider=0.0, whole=False):
+    """Return an even rod with this midline, but for its first width."""
     near = S < WIDTH
     width = WIDTH + wider * near
     tip = EndFace(s=S[-1], sigma=0.05, skew=0.0, scatter=0.0, found=1.0, rise=0.5)
     return Refined(
-        fit=fit, shaded=shaded * near, good=np.ones(len(S), np.bool_), width=width,
+        fit=fit, shaded=shaded * near, relit=relit * near,
+        good=np.ones(len(S), np.bool_), width=width,
         sigma_width=np.full(len(S), 0.05), typical_width=WIDTH, tip=tip, clamp=None,
         rough=False, blur=1.0, saturated=0.0, whole=whole,
     )  # fmt: skip
@@ -66,10 +67,11 @@ def test_a_direction_under_noise_alone_is_told_once():
     assert 1.0 < np.sqrt(np.mean(np.square(told))) / scatter < 1.6
 
 
-def test_shade_another_width_and_white_paper_leave_a_direction_in_doubt():
+def test_light_another_width_and_white_paper_leave_a_direction_in_doubt():
     fit = fitted(np.random.default_rng(7).normal(0.0, 0.01, len(S)))
     plain = told_rad(fit)
     assert told_rad(fit, shaded=0.3) > 1.5 * plain
+    assert told_rad(fit, relit=0.3) > 1.5 * plain
     assert told_rad(fit, wider=1.0) > 1.5 * plain
     # Edges beside white paper are fitted to a part of their light.
     assert told_rad(fit, whole=True) > 1.5 * plain

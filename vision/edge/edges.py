@@ -104,6 +104,14 @@ class Edges(NamedTuple):
         """How much an edge jumps from one station to the one `lag` stations on, px."""
         return float(_wander(self.low, self.high, lag))
 
+    def relit(self, blur: float) -> Array:
+        """How far either edge would move by what the rod's light changes along it, px.
+
+        Were the change all on that side: half of it, over the slope of the edge.
+        """
+        change = np.abs(self.inner - median(self.inner)) / self.contrast
+        return np.nan_to_num(0.5 * _ROOT_2PI * blur * change)
+
     def shaded(self, blur: float) -> Array:
         """Half the difference of what the paper's slope does to either edge, px."""
         return np.asarray(_shaded(self, 1.5 * clear_of(blur)))

@@ -54,17 +54,18 @@ that is not dark, and what of it is left in a dark rod's width."""
 PALE_PX = 0.2
 """Of a width that is not dark, whatever is seen of its sides."""
 
-SUPPLE = 1.3
+SUPPLE = 1.2
 """Of the direction at the clamp, over the fit's own: what is known of bending moments
 holds roughly."""
-ODD, BACK, LATE, BENT = 2.1, 0.25, 0.5, 0.01
+ODD, BACK, LATE, BENT = 2.2, 0.25, 0.5, 0.01
 """Factor for a rod that is bent as no single force bends it: both ways, the lesser way
 by this share at least, or its root by less than this share of its most; by so much over
 its width. What is known of moments helps less at the root then. So it is beside paper
 that is white, where edges are fitted to a part of their light."""
-TURN_SHADE, TURN_WALL, TURN_PALE_WALL = 0.27, 0.11, 0.5
-"""Shares of the shade's pull, and of the side wall that is seen (on a rod that is not
-dark: its light is not known), by which the midline is off all along, with one sign."""
+TURN_SHADE, TURN_RELIT, TURN_WALL, TURN_PALE_WALL = 0.28, 0.35, 0.11, 0.4
+"""Shares by which the midline is off all along, with one sign: of the shade's pull, of
+what an edge may move where the light on the rod changes, and of the side wall that is
+seen (on a rod that is not dark: its light is not known)."""
 TURN_UNEVEN, BESIDE = 0.3, 2.0
 """Share by which it is off of what a rod is wider beside its clamp, within so many
 widths, than anywhere else: there a shade may have moved one edge (a half is all)."""
@@ -248,6 +249,7 @@ def direction_rad(refined: Refined, root: float, wall: Array, seen_in: View) -> 
     return math.hypot(
         SUPPLE * (ODD if odd else 1.0) * sigma_heading(fit, before),
         turned_by_shade(refined),
+        TURN_RELIT * fit.lever @ refined.relit,
         facing * fit.lever @ wall,
         TURN_UNEVEN * _turned_by_width(refined),
     )

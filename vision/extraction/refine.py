@@ -59,6 +59,8 @@ class Refined:
         The axis from where the clamp line was taken (s = 0) to the tip's face.
     shaded : ndarray, shape (n,)
         By how much shade on the paper would have moved the midline, uncorrected, px.
+    relit : ndarray, shape (n,)
+        By how much its edges may move where the light on it changes, px.
     good : ndarray of bool, shape (n,)
         Points of the fit whose edges were used.
     width : ndarray, shape (n,)
@@ -92,6 +94,7 @@ class Refined:
 
     fit: CurveFit
     shaded: Array
+    relit: Array
     good: NDArray[np.bool_]
     width: Array
     sigma_width: Array
@@ -227,7 +230,8 @@ def refine(
     curve = fit.curve._replace(s=fit.curve.s - first)
     white = saturated(seen, sign)
     return Refined(
-        fit=replace(fit, curve=curve), shaded=shaded, good=used,
+        fit=replace(fit, curve=curve), shaded=shaded,
+        relit=np.interp(at, seen.s, seen.edges.relit(state.blur)), good=used,
         width=width, sigma_width=sigma_width, typical_width=median(width[used]),
         tip=tip._replace(s=tip.s - first),
         clamp=None if lines is None else lines.shifted(first), rough=state.rough,
