@@ -115,7 +115,7 @@ def uniform_field() -> list[Finding]:
 
 
 def end_face_share(
-    *, side_mm: float = 1.0, length_mm: float = 30.0, nodes: int = 48
+    *, side_mm: float = 1.0, length_mm: float = 30.0, nodes: int = 16
 ) -> float:
     """Return the Maxwell traction's force on the tip face over the whole M A B.
 

@@ -12,8 +12,14 @@ from magbend.analysis.library.query import query
 from magbend.analysis.library.space import Space
 from magbend.core.errors import StoreError
 
-distributed = pytest.importorskip("distributed")
-pytest.importorskip("pyarrow")
+pytestmark = pytest.mark.usefixtures("distributed")
+
+
+@pytest.fixture(scope="module")
+def distributed():
+    """Return the package; who only collects the tests need not import it."""
+    pytest.importorskip("pyarrow")
+    return pytest.importorskip("distributed")
 
 
 def space(designs: int) -> Space:
@@ -35,7 +41,7 @@ def space(designs: int) -> Space:
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # those of a killed cluster are not ours
-def test_a_killed_worker_loses_and_repeats_nothing(tmp_path):
+def test_a_killed_worker_loses_and_repeats_nothing(tmp_path, distributed):
     what, out = space(50_000), tmp_path / "out"
     written: dict[str, int] = {}
     killed = []

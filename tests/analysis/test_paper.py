@@ -15,6 +15,7 @@ from magbend import sim
 from magbend.analysis import compare_run, load_run
 from magbend.analysis.paper.audit import audit_paper, write_audit
 from magbend.analysis.paper.field_claims import end_face_share
+from magbend.analysis.paper.finding import Finding
 from magbend.analysis.paper.paper import gmc_numbers, reproduce
 from magbend.analysis.paper.probe import (
     fit_standoff,
@@ -81,11 +82,12 @@ def test_probe_refuses_what_cannot_be(tmp_path: Path) -> None:
         read_probe_csv(table)
 
 
-FINDINGS = audit_paper()
+@pytest.fixture(scope="module")
+def findings() -> tuple[Finding, ...]:
+    return audit_paper()
 
 
-def test_audit_computes_its_verdicts() -> None:
-    findings = FINDINGS
+def test_audit_computes_its_verdicts(findings: tuple[Finding, ...]) -> None:
     by_claim = {finding.claim: finding for finding in findings}
     verdicts = [finding.verdict for finding in findings[1:4]]
     assert verdicts == ["reproduced", "reproduced", "differs"]
@@ -117,16 +119,23 @@ def test_audit_computes_its_verdicts() -> None:
     ],
 )
 def test_audit_says_what_the_paper_leaves_out(
-    words: str, value: float, off: float, verdict: str, says: str
+    findings: tuple[Finding, ...],
+    words: str,
+    value: float,
+    off: float,
+    verdict: str,
+    says: str,
 ) -> None:
-    (finding,) = [f for f in FINDINGS if words in f.claim]
+    (finding,) = [f for f in findings if words in f.claim]
     assert finding.verdict == verdict
     assert says in finding.claim + finding.evidence
     assert finding.value == pytest.approx(value, abs=off, nan_ok=True)
 
 
-def test_the_papers_first_claim_stands_up_front() -> None:
-    assert "circular" in FINDINGS[0].claim
+def test_the_papers_first_claim_stands_up_front(
+    findings: tuple[Finding, ...],
+) -> None:
+    assert "circular" in findings[0].claim
 
 
 def test_end_face_carries_half_by_an_independent_field() -> None:
@@ -143,8 +152,8 @@ def test_end_face_carries_half_by_an_independent_field() -> None:
     assert end_face_share() == pytest.approx(0.5, abs=1e-3)
 
 
-def test_audit_page_stands_alone(tmp_path: Path) -> None:
-    write_audit(tmp_path / "audit.html", FINDINGS)
+def test_audit_page_stands_alone(findings: tuple[Finding, ...], tmp_path: Path) -> None:
+    write_audit(tmp_path / "audit.html", findings)
     text = (tmp_path / "audit.html").read_text()
     assert "1.2186 T" in text
     assert "http" not in text
