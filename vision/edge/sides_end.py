@@ -127,7 +127,7 @@ def _found(
         return np.nan, False
     seen = np.zeros(s.size + 1)
     seen[1:] = np.cumsum(np.minimum(contrast / (_ENOUGH * usual), 1.0))
-    n = max(round(width / (s[1] - s[0])), 2)
+    n = max(round(min(width, _STEP)), 2)
     better = (seen[2 * n :] + seen[: -2 * n] - 2.0 * seen[n:-n]) / n
     sure = np.flatnonzero(better > _SURE)
     if sure.size == 0:

@@ -33,8 +33,8 @@ def saturated(seen: Seen, sign: float) -> float:
     """
     edges = seen.edges
     light = np.maximum(edges.outer_low, edges.outer_high) if sign > 0 else -edges.inner
-    white = np.count_nonzero((light > WHITE) & seen.good)
-    return white / np.count_nonzero(seen.good)
+    white = int(np.count_nonzero((light > WHITE) & seen.good))
+    return white / max(int(np.count_nonzero(seen.good)), 1)
 
 
 def is_cut_off(grey: Image, white: float) -> bool:

@@ -81,12 +81,12 @@ def _steps(
     for k in range(len(light)):
         dark, paper = np.min(light[k]), np.max(light[k])
         body = np.flatnonzero(light[k] < dark + _EDGE * (paper - dark))
-        if body[0] == 0 or body[-1] == across.size - 1:
-            continue  # a soft shade, no edge was taken for
+        if body.size == 0 or body[0] == 0 or body[-1] == across.size - 1:
+            continue  # beyond the picture; or a soft shade, no edge was taken for
         low, high = across[body[0]], across[body[-1]]
         inside = (across > low + clear) & (across < high - clear)
         profile = light[k][inside]
-        if profile.size == 0 or np.ptp(profile) <= _STEP * (paper - dark):
+        if not (profile.size and np.ptp(profile) > _STEP * (paper - dark)):
             continue  # as in nearly all rods
         place, rise = _step(across[inside], profile, paper, _NARROW * width, clear)
         if rise != 0.0:
