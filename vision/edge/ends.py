@@ -55,12 +55,13 @@ def _free_end(
 ) -> EndFace | None:  # fmt: skip
     """Return the tip, or the other end of a rod that floats, by `s` towards it."""
     curve, edges, width, towards = state.curve, seen.edges, state.width, seen.s
-    expected, blur, aside = state.last, state.tip_blur or state.blur, 1.0
+    expected, blur = state.last, state.tip_blur or state.blur
     if not at_tip:
-        curve, towards, aside = curve.reversed(), -seen.s, -1.0
+        curve, towards = curve.reversed(), -seen.s
         expected, blur = -state.first, state.blur
     near = seen.good & (towards > curve.s[-1] - 3.0 * width)
-    middle = aside * median(edges.middle[near]) if near.any() and not fine else 0.0
+    seeks = at_tip and not fine and near.any()
+    middle = median(edges.middle[near]) if seeks else 0.0
     end = seen.good & (towards > curve.s[-1] - 1.5 * width)
     taper = median(edges.width[end]) if at_tip and end.sum() > 3 else width
     outwards, reach = (0.0, 0.3 * width + 2.0) if fine else (0.4 * width, 1.3 * width)
