@@ -27,7 +27,7 @@ from .told_clamp import ToldClamp, surer_direction
 
 Array = NDArray[np.float64]
 
-LONE_DEG = 0.8
+LONE_DEG = 0.86
 """Turn by shade beside the root above which the rod says nothing of its direction: what
 the front of the clamp tells, which may be the shade's, is then unchecked."""
 APART = 3.0

@@ -54,15 +54,15 @@ that is not dark, and what of it is left in a dark rod's width."""
 PALE_PX = 0.2
 """Of a width that is not dark, whatever is seen of its sides."""
 
-SUPPLE = 1.2
+SUPPLE = 1.38
 """Of the direction at the clamp, over the fit's own: what is known of bending moments
 holds roughly."""
-ODD, BACK, LATE, BENT = 2.2, 0.25, 0.5, 0.01
+ODD, BACK, LATE, BENT = 2.0, 0.25, 0.5, 0.01
 """Factor for a rod that is bent as no single force bends it: both ways, the lesser way
 by this share at least, or its root by less than this share of its most; by so much over
 its width. What is known of moments helps less at the root then. So it is beside paper
 that is white, where edges are fitted to a part of their light."""
-TURN_SHADE, TURN_RELIT, TURN_WALL, TURN_PALE_WALL = 0.28, 0.35, 0.11, 0.4
+TURN_SHADE, TURN_RELIT, TURN_WALL, TURN_PALE_WALL = 0.3, 0.4, 0.13, 0.4
 """Shares by which the midline is off all along, with one sign: of the shade's pull, of
 what an edge may move where the light on the rod changes, and of the side wall that is
 seen (on a rod that is not dark: its light is not known)."""
