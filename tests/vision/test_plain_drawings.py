@@ -41,21 +41,27 @@ def axis(turn_deg, length=400.0):
 
 
 def strip(turn_deg, low, high):
-    """Return the corners of what lies along a rod between two offsets, in widths."""
+    """Return the corners of what lies along a rod between two offsets, in widths.
+
+    They are numbers, or one for each of the 400 points of the axis.
+    """
     points, theta = axis(turn_deg)
     aside = WIDTH * np.column_stack([-np.sin(theta), np.cos(theta)])
+    low, high = np.reshape(low, (-1, 1)), np.reshape(high, (-1, 1))
     return np.vstack([points + low * aside, (points + high * aside)[::-1]])
 
 
 def drawn(
     *, rod, turn_deg, shade_px=(0, 0), deep=0.0, clamp=0.2, over=(), blur_px=1.0,
-    board=0.7,
+    board=0.7, thin=1.0,
 ):  # fmt: skip
     """Return a photograph of a rod whose shade is moved by `shade_px`.
 
-    `over` are pairs of a colour and corners, drawn over all else.
+    `over` are pairs of a colour and corners, drawn over all else. The rod tapers to
+    `thin` of its width.
     """
-    body = strip(turn_deg, -0.5, 0.5)
+    half = np.linspace(0.5, 0.5 * thin, 400)
+    body = strip(turn_deg, -half, half)
     moved = np.asarray(shade_px, float)
     both = np.vstack([CLAMP, CLAMP + 1.8 * moved]).astype(np.float32)
     shade = np.maximum(
@@ -532,3 +538,15 @@ def test_a_rod_that_is_found_and_not_measured_is_shown(monkeypatch):
     points, _ = axis(30.0)
     middle = found.seen_px[0][len(found.seen_px[0]) // 2]
     assert np.hypot(*(points - middle).T).min() < 0.5 * WIDTH
+
+
+@pytest.mark.parametrize("thin", [0.35, 0.2])
+def test_a_taper_is_measured_to_its_thin_end(thin):
+    found = measured(rod=BLACK, turn_deg=40.0, thin=thin)
+    assert not set(found.flags) & {"tip_goes_on", "ragged_tip", "clamp_lines_differ"}
+    assert abs(found.length_mm - 20.0) < found.length_sd_mm < 0.2
+    points, _ = axis(40.0)
+    assert np.abs(signed_distance(found.points_px, points)[2:-2]).max() < 0.3
+    width = found.points["width_mm"]
+    drawn_mm = np.linspace(1.0, thin, len(width))  # WIDTH is 1 mm
+    assert np.nanmax(np.abs(width - drawn_mm)[5:-5]) < 0.1

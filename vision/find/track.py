@@ -115,6 +115,7 @@ def start_curve(
     rough = blur > 1.0
     alike = FLARED * real if rough else 0.3 * real + 1.0
     good = found & (np.abs(across - real) < alike)
+    good |= found & _is_tapering(s, across, good, 0.5 * alike, 0.2 * real + 1.0)
     if good.sum() < 0.5 * len(across):
         return None
     centre = along + (0.5 * (low + high))[:, None] * normals
@@ -135,6 +136,23 @@ def start_curve(
         rough=_is_rough(across[found], real),
         blur=blur,
     )
+
+
+def _is_tapering(
+    s: Array, across: Array, alike: NDArray[np.bool_], least: float, near: float
+) -> NDArray[np.bool_]:
+    """Whether a rod is as wide there as the taper of what is of about one width has it.
+
+    It must make at least so much there, and the width be so near to it, px.
+    """
+    if alike.sum() < 0.3 * len(across):
+        return alike
+    centre, usual = s[alike].mean(), across[alike].mean()
+    along = s[alike] - centre
+    slope = along @ (across[alike] - usual) / (along @ along)
+    taper = slope * (s - centre)
+    near_it = np.abs(across - usual - taper) < near
+    return np.asarray((np.abs(taper) > least) & near_it)
 
 
 def _means(points: Array, count: int) -> Array:
