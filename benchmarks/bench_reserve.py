@@ -9,6 +9,8 @@ needless refusals, those wrong without a flag (RMS above 0.15 mm or tip above 0.
 errors in mm, and the direction's pull in stated deviations; then how many right
 ones are doubted. ``--kind`` draws one kind only, and prints it by what was drawn (of
 blur: defocus, motion, grain, gloss, exposure; ``--defect`` draws one of these).
+Clamps are drawn square to their rods, and that is told; ``--skew-deg 0.25`` draws them
+as square, and tells no more, than a clamp of which nothing is told is taken to be.
 ``--page`` writes a page (index.html) with overlays of the ten worst and of the refused.
 ``--peers`` measures the same scenes with scikit-image and skan, whose masks are given
 to them (`reserve_peers`).
@@ -76,10 +78,11 @@ class Row:
         return self.wrong and not self.doubted
 
 
-def measured(case: Case) -> Row:
+def measured(case: Case, skew_deg: float) -> Row:
     found = extract(
         case.photo, case.camera, rod_height_mm=case.height_mm,
         clamp_height_mm=case.scene.clamp.height_mm, is_round=False,
+        clamp_square_sd_deg=skew_deg,
     )  # fmt: skip
     if not found.ok or found.pose is None:
         return Row(case=case, found=found)
@@ -215,6 +218,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=9001)
     parser.add_argument("--kind", choices=KINDS, help="this kind of scene only")
     parser.add_argument("--defect", choices=DEFECTS, help="of --kind blur, this alone")
+    parser.add_argument("--skew-deg", type=float, default=0.0, help="of clamps, sd")
     parser.add_argument("--page", type=Path, help="folder for overlays")
     parser.add_argument("--peers", action="store_true", help="measure with peers too")
     parser.add_argument("--quiet", action="store_true", help="the table alone")
@@ -223,7 +227,9 @@ def main() -> int:
     step = len(KINDS) if options.kind else 1
     first = KINDS.index(options.kind) if options.kind else options.first
     for index in range(first, first + step * options.count, step):
-        row = measured(draw_case(options.seed, index, defect=options.defect))
+        skew = options.skew_deg
+        case = draw_case(options.seed, index, defect=options.defect, skew_deg=skew)
+        row = measured(case, skew)
         rows.append(row)
         if options.peers:
             peers.append(of_peers(row.case))

@@ -64,11 +64,13 @@ class Case:
 
 
 def draw_case(
-    seed: int, index: int, label: Label | None = None, defect: str | None = None
-) -> Case:
+    seed: int, index: int, label: Label | None = None, defect: str | None = None,
+    skew_deg: float = 0.0,
+) -> Case:  # fmt: skip
     """Draw a scene: the same for the same seed and index, with a tag on its clamp.
 
-    `defect` is one of `DEFECTS` that a scene of kind "blur" is to have.
+    `defect` is one of `DEFECTS` that a scene of kind "blur" is to have; `skew_deg` the
+    standard deviation by which clamps are not square to their rods.
     """
     kind = KINDS[index % len(KINDS)]
     rng = np.random.default_rng([seed, index])
@@ -90,6 +92,8 @@ def draw_case(
         scene, words = _blurred(rng, scene, defect)
     elif kind == "mixed":
         scene, words = _mixed(rng, scene, camera)
+    turn = skew_deg * np.random.default_rng([seed, index, 1]).normal()
+    scene = replace(scene, clamp=replace(scene.clamp, skew_deg=float(turn)))
     if label is not None:
         scene = replace(scene, clamp=_labelled(scene.clamp, label))
     picture = render_scene(scene, camera, rng)

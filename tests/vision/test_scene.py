@@ -108,6 +108,17 @@ def test_clamp_has_its_colour(colour):
     np.testing.assert_allclose(linear, colour, atol=0.04)
 
 
+def test_a_clamp_that_is_not_square_is_turned_about_the_middle_of_its_front():
+    block = replace(CLAMP, skew_deg=90.0, screws_mm=())
+    picture = photograph(Scene(clamp=block, light=replace(QUIET, shadow_depth=0.0)))
+    seen = block.pose.to_board(np.array([[3.0, -8.0], [-8.0, 0.0]]))
+    (in_it, beside) = SMALL.to_px(seen, height_mm=block.height_mm).astype(int)
+    assert picture[in_it[1], in_it[0]].max() < 160 < picture[beside[1], beside[0]].min()
+    np.testing.assert_allclose(
+        block.to_board(np.zeros((1, 2))), block.pose.to_board(np.zeros((1, 2)))
+    )
+
+
 def test_gloss_and_other_blocks_show():
     magnet = Block(
         pose=Pose(x_mm=40.0, y_mm=-52.0, angle_deg=90.0), length_mm=20.0, width_mm=55.0

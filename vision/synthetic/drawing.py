@@ -32,7 +32,7 @@ def _block_corners(block: Block) -> Array:
     corners = np.array(
         [[0.0, half], [0.0, -half], [-block.length_mm, -half], [-block.length_mm, half]]
     )
-    return block.pose.to_board(corners)
+    return block.to_board(corners)
 
 
 def block_walls(block: Block, camera: Calibration) -> Picture:
@@ -83,7 +83,7 @@ def draw_top(picture: Picture, block: Block, camera: Calibration) -> None:
             ring = np.column_stack(
                 [radius * np.cos(around) - behind_mm, radius * np.sin(around)]
             )
-            outline = camera.to_px(block.pose.to_board(ring), height_mm=height)
+            outline = camera.to_px(block.to_board(ring), height_mm=height)
             colour = scaled(block.colour, factor)
             paint(picture, coverage(outline, *size), colour)
     if block.label is not None:
@@ -94,7 +94,7 @@ def _draw_label(
     picture: Picture, block: Block, label: Label, camera: Calibration
 ) -> None:
     def seen(outline_mm: Array) -> Array:
-        on_board = block.pose.to_board(subdivide(outline_mm))
+        on_board = block.to_board(subdivide(outline_mm))
         return camera.to_px(on_board, height_mm=block.height_mm)
 
     size = camera.image_size_px

@@ -7,7 +7,7 @@ paper. Colours are reflectances in blue, green, red, from 0 to 1.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,6 +53,9 @@ class Block:
         Distances of screw heads behind the front face.
     label : Label, optional
         A printed tag on its top.
+    skew_deg : float
+        By how much it is turned about the middle of its front, away from `pose`: no
+        clamp is made quite square to its rod.
     """
 
     pose: Pose
@@ -62,6 +65,12 @@ class Block:
     colour: Colour = GREY
     screws_mm: tuple[float, ...] = (6.0, 16.0)
     label: Label | None = None
+    skew_deg: float = 0.0
+
+    def to_board(self, points_mm: Array) -> Array:
+        """Return where on the board what is told in its own frame lies, (n, 2)."""
+        turned = self.pose.angle_deg + self.skew_deg
+        return replace(self.pose, angle_deg=turned).to_board(points_mm)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
