@@ -93,8 +93,9 @@ _EXPLAINED = {
     "calibrated",
     "width_mismatch": "the rod is not as wide as its specimen: another rod, or a hard "
     "shade was measured with it",
-    "width_uneven": "the rod is not as wide all along: a shade as dark as itself may "
-    "be measured with it where they lie side by side; light it from more sides",
+    "width_uneven": "the rod is not as wide all along: it tapers or swells, or a shade "
+    "as dark as itself is measured with it where they lie side by side; light it from "
+    "more sides, and look at the overlay",
     "colour_mismatch": "what was measured has another colour than the specimen: its "
     "shade, or another thing; look at the overlay",
     "tag_differs": "the tag and the rod itself tell different clamps: the tag came "
@@ -145,7 +146,8 @@ def _tell_clamps(frames: Sequence[FrameRow]) -> None:
     if moved:
         say(
             f"clamp_moved: {moved} photographs of one clamp disagree on its place or "
-            "direction; each keeps its own",
+            "direction; each keeps its own: if neither camera nor clamp was moved, "
+            "light its front evenly, or put a tag on it (vision board --clamp-tag)",
             err=True,
         )
 
