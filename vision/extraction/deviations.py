@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..camera.calibration import Calibration
 from ..camera.projection import LocalView
 from ..curve.heading import sigma_heading
-from ..curve.robust import median
+from ..curve.robust import median, quantile
 from ..find.ground import View
 from ..measurement import Measurement
 from .refine import Refined
@@ -62,13 +62,14 @@ ODD, BACK, LATE, BENT = 2.0, 0.25, 0.5, 0.01
 by this share at least, or its root by less than this share of its most; by so much over
 its width. What is known of moments helps less at the root then. So it is beside paper
 that is white, where edges are fitted to a part of their light."""
-TURN_SHADE, TURN_RELIT, TURN_WALL, TURN_PALE_WALL = 0.3, 0.4, 0.13, 0.4
-"""Shares by which the midline is off all along, with one sign: of the shade's pull, of
-what an edge may move where the light on the rod changes, and of the side wall that is
-seen (on a rod that is not dark: its light is not known)."""
-TURN_UNEVEN, BESIDE = 0.3, 2.0
-"""Share by which it is off of what a rod is wider beside its clamp, within so many
-widths, than anywhere else: there a shade may have moved one edge (a half is all)."""
+TURN_SHADE, TURN_WALL, TURN_PALE_WALL = 0.3, 0.13, 0.4
+"""Shares of the shade's pull, and of the side wall that is seen (on a rod that is not
+dark: its light is not known), by which the midline is off all along, with one sign."""
+TURN_RELIT, TURN_UNEVEN, BESIDE, USUAL = 0.5, 0.3, 2.0, 0.9
+"""Shares by which it is off of what an edge may move where the light on a rod changes
+beside its clamp, within so many widths, by more than on this part of the rest, and of
+what it is wider there than anywhere else: a shade may have moved one edge (a half is
+all)."""
 
 WHOLE, CUT_OFF = 0.05, 0.45
 """Of an edge beside paper that is white, in px and again in blurs where all its light
@@ -249,7 +250,7 @@ def direction_rad(refined: Refined, root: float, wall: Array, seen_in: View) -> 
     return math.hypot(
         SUPPLE * (ODD if odd else 1.0) * sigma_heading(fit, before),
         turned_by_shade(refined),
-        TURN_RELIT * fit.lever @ refined.relit,
+        TURN_RELIT * fit.lever @ _relit_beside(refined),
         facing * fit.lever @ wall,
         TURN_UNEVEN * _turned_by_width(refined),
     )
@@ -273,6 +274,17 @@ def is_oddly_bent(kappa: Array, width: float) -> bool:
 def turned_by_shade(refined: Refined) -> float:
     """Return how far shade beside the root may turn the rod's own direction, rad."""
     return TURN_SHADE * abs(float(refined.fit.lever @ refined.shaded))
+
+
+def _relit_beside(refined: Refined) -> Array:
+    """Return how far more light that changes beside the clamp may move an edge, px.
+
+    More than it does on the rest of the rod, where it changes on both sides alike.
+    """
+    s = refined.fit.curve.s
+    rest = refined.relit[s - s[0] > BESIDE * refined.typical_width]
+    usual = quantile(rest, USUAL) if rest.size else 0.0
+    return np.maximum(refined.relit - usual, 0.0)
 
 
 def _turned_by_width(refined: Refined) -> float:
