@@ -64,6 +64,18 @@ def test_a_clamp_is_not_where_a_rod_from_the_border_leads_through(behind, held_y
     assert (better(whole, part) is part) == held
 
 
+@pytest.mark.parametrize(("held_px", "held"), [(120.0, False), (900.0, True)])
+def test_a_scrap_in_a_doubtful_clamp_is_no_rod_beside_one_from_the_border(
+    held_px, held
+):
+    rod = line(600.0, ("clamp_at_border",))
+    rod.points["width_px"] = np.full(50, 20.0)
+    scrap = line(held_px, ("clamp_doubtful",))
+    scrap.points["y_px"][:] = 300.0
+    scrap = replace(scrap, clamp_px=(100.0, 300.0), tip_px=(100.0 + held_px, 300.0))
+    assert (better(rod, scrap) is scrap) == held
+
+
 @pytest.mark.parametrize(
     ("y", "width", "elsewhere"),
     [(80.0, 9.0, False), (85.5, 9.0, True), (85.0, 20.0, False), (92.0, 40.0, True)],

@@ -57,11 +57,14 @@ def better(quick: Measurement, whole: Measurement) -> Measurement:
     """Return the one of two measurements that is longer, or held by a clamp.
 
     Of two with the same ends it is that with fewer flags. What ends where a rod that
-    comes in at the border leads through is a part of that. Of two things, such as both
-    walls of a tube, of which one has the other beside it, either may be the rod.
+    comes in at the border leads through is a part of that; where a clamp is in doubt,
+    what is longer is the rod. Of two things, such as both walls of a tube, of which one
+    has the other beside it, either may be the rod.
     """
     if "clamp_at_border" in quick.flags:
         held = not {"clamp_at_border", "no_clamp"} & set(whole.flags)
+        if "clamp_doubtful" in whole.flags:
+            held &= whole.length_px > quick.length_px
         ends = whole.clamp_px, whole.tip_px
         part = any(_leads_through(quick, end) for end in ends)
         return whole if held and not part else quick
