@@ -210,19 +210,12 @@ def find_front(
         fit_step, blur=blur, inner=_CLAMP_SPAN * wide, outer=SPAN * wide, own=True,
         fine=fine,
     )  # fmt: skip
-    front = fit(
-        _front(
-            grey,
-            curve,
-            expected + 0.5 * ahead,
-            _span(reach, blur) + 0.5 * ahead,
-            (_BESIDE if fine else _BESIDE[::2]) * width,
-            near,
-            contrast,
-            reach + 0.5 * ahead,
-            sign,
-        )
-    )
+    seen = _front(
+        grey, curve, expected + 0.5 * ahead, _span(reach, blur) + 0.5 * ahead,
+        (_BESIDE if fine else _BESIDE[::2]) * width, near, contrast,
+        reach + 0.5 * ahead, sign,
+    )  # fmt: skip
+    front = fit(seen)
     if front is None or not fine or front.rise <= 0.0 or front.bulge:
         return front
     return whole_front(

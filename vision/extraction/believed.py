@@ -66,7 +66,7 @@ def better(quick: Measurement, whole: Measurement) -> Measurement:
         if "clamp_doubtful" in whole.flags:
             held &= whole.length_px > quick.length_px
         ends = whole.clamp_px, whole.tip_px
-        part = any(_leads_through(quick, end) for end in ends)
+        part = held and any(_leads_through(quick, end) for end in ends)
         return whole if held and not part else quick
     if not _same(quick, whole):
         return doubted(whole) if OTHER_ROD in quick.flags else whole

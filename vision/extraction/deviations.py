@@ -281,8 +281,7 @@ def _relit_beside(refined: Refined) -> Array:
 
     More than it does on the rest of the rod, where it changes on both sides alike.
     """
-    s = refined.fit.curve.s
-    rest = refined.relit[s - s[0] > BESIDE * refined.typical_width]
+    rest = refined.relit[_away(refined)]
     usual = quantile(rest, USUAL) if rest.size else 0.0
     return np.maximum(refined.relit - usual, 0.0)
 
@@ -294,5 +293,11 @@ def _turned_by_width(refined: Refined) -> float:
     """
     fit, wider = refined.fit, refined.width - refined.typical_width
     turned = np.abs(np.correlate(wider, fit.lever, "full")[wider.size - 1 :])
-    away = fit.curve.s - fit.curve.s[0] > BESIDE * refined.typical_width
-    return max(float(turned[0] - np.max(turned[away], initial=0.0)), 0.0)
+    elsewhere = np.max(turned[_away(refined)], initial=0.0)
+    return max(float(turned[0] - elsewhere), 0.0)
+
+
+def _away(refined: Refined) -> NDArray[np.bool_]:
+    """Return which points of a rod do not lie beside its clamp."""
+    s = refined.fit.curve.s
+    return np.asarray(s - s[0] > BESIDE * refined.typical_width)
